@@ -39,6 +39,22 @@ check "from what it saved, drawn as it was" run 0 composite parts.txc -o again.p
 check "the same picture" cmp composite.png again.png
 refuses 1 "more than 16 colours" composite parts.png --labels parts.png -o n.png --size 60x50
 
+check "segment" run 0 segment parts.png -o segments.png --segments 3 --gray
+check "has the size" check_tool patch is segments.png 96 96 1 8
+refuses 2 "--segments" segment parts.png -o n.png --segments 99
+
+check "knit" run 0 knit plain.png cells.png --layout top.png -o knit.png
+check "has the size and channels" check_tool patch is knit.png 64 64 3 8
+refuses 2 "--layout" knit plain.png cells.png -o n.png
+
+check "relight" run 0 relight sand.png --like cells.png -o relit.png
+check "has the size and channels" check_tool patch is relit.png 48 48 3 8
+refuses 2 "--like" relight sand.png -o n.png
+
+check "erode" run 0 erode sand.png --weathered cells.png --level 0.5 -o eroded.png
+check "has the size and channels" check_tool patch is eroded.png 48 48 3 8
+refuses 2 "--weathered" erode sand.png -o n.png
+
 check "patch" run 0 patch bricks.png -o patch.png --size 64x64 --passes 1
 check "has the size and channels" check_tool patch is patch.png 64 64 3 8
 refuses 1 "No such file" patch missing.png -o n.png --size 64x64
