@@ -8807,6 +8807,7 @@ enum { TXS_LAY_FIELD, TXS_LAY_PAIR, TXS_LAY_PARENT, TXS_LAY_RING };
 typedef struct txs_lay_type {
     int kind, dx, dy; /* of a ring, dx is the distance */
     int32_t share[TXS_LAY_BINS];
+    int16_t root[TXS_LAY_BINS]; /* as a file keeps it, see txs_lay_round */
 } txs_lay_type;
 
 typedef struct txs_lay_level {
@@ -9001,24 +9002,24 @@ static int txs_lay_rows(const txs_layout *layout, int kind) {
     return kind == TXS_LAY_RING ? TXS_LAY_AROUND + 1 : layout->labels;
 }
 
-/* Round a share to what is kept: its root in steps, beside each other without the empty columns. */
-static void txs_lay_roots(const txs_layout *layout, const txs_lay_type *t, int16_t *root) {
+/* Round shares to what is kept: roots in steps, beside each other without the empty columns. */
+static void txs_lay_round(const txs_layout *layout, txs_lay_type *t) {
     const int rows = txs_lay_rows(layout, t->kind);
     for (int i = 0; i < rows * layout->labels; i++) {
         const int32_t share = t->share[i / layout->labels * TXS_MAX_LABELS + i % layout->labels];
-        root[i] =
+        t->root[i] =
             (int16_t)floor(sqrt((double)share / (double)TXS_ONE) * (double)TXS_LAY_SCALE + 0.5);
     }
 }
 
 /* The inverse, normalised as txs_lay_normalise has it; 0 for an empty histogram. */
-static int txs_lay_unroot(const txs_layout *layout, txs_lay_type *t, const int16_t *root) {
+static int txs_lay_unround(const txs_layout *layout, txs_lay_type *t) {
     const txs_lay_view view = {NULL, NULL, layout->field};
     const int rows = txs_lay_rows(layout, t->kind);
     int32_t square[TXS_LAY_BINS] = {0}, total = 0;
     for (int i = 0; i < rows * layout->labels; i++) {
-        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = root[i] * root[i];
-        total += root[i] * root[i];
+        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = t->root[i] * t->root[i];
+        total += t->root[i] * t->root[i];
     }
     txs_lay_normalise(&view, t, square, t->share);
     return total > 0;
@@ -9607,7 +9608,7 @@ done:
 static double txs_lay_order(const txs_lay_plane *map, int field, int labels) {
     int32_t count[TXS_LAY_BINS];
     const txs_lay_view view = {map, NULL, field};
-    const txs_lay_type type = {TXS_LAY_FIELD, 0, 0, {0}};
+    const txs_lay_type type = {TXS_LAY_FIELD, 0, 0, {0}, {0}};
     const double total = (double)txs_lay_count(&view, &type, count);
     double mutual = 0, entropy = 0, share[TXS_MAX_LABELS] = {0};
     for (int i = 0; i < TXS_LAY_BINS; i++) share[i % TXS_MAX_LABELS] += count[i] / total;
@@ -10046,9 +10047,11 @@ static int txs_cross_unround(txs_type *t) {
 }
 
 /* Round what was measured to what a file keeps, and read that again, so that saving loses nothing. */
-static txm_status txs_composite_settle(const texsyn_composite *c, txm_env *env,
-                                       texsyn_composite **out) {
+static txm_status txs_composite_settle(texsyn_composite *c, txm_env *env, texsyn_composite **out) {
     size_t size = 0;
+    for (int i = 0; i < c->layout.levels; i++)
+        for (int k = 0; k < c->layout.level[i].type_count; k++)
+            txs_lay_round(&c->layout, &c->layout.level[i].types[k]);
     for (int i = 0; i < c->levels; i++) {
         for (int k = 0; k < c->labels; k++)
             for (int j = 0; j < c->model[k]->level[i].type_count; j++)
@@ -10427,7 +10430,6 @@ enum { TXS_LAY_SIDE_BITS = 24 };
 typedef struct txs_composite_codec {
     txs_context place[2], share[4][8];
     txs_context cross_place[2], cross_share[8];
-    int16_t root[TXS_LAY_BINS], like[TXS_LAY_BINS];
     txs_codec model;
 } txs_composite_codec;
 
@@ -10451,11 +10453,9 @@ static void txs_code_lay_type(txs_coder *c, txs_composite_codec *z, const txs_la
         c->bad = 1;
     if (c->bad) return;
     while (before >= 0 && l->types[before].kind != t->kind) before--;
-    txs_lay_roots(layout, t, z->root);
-    if (before >= 0) txs_lay_roots(layout, &l->types[before], z->like);
-    txs_sequence(c, z->share[t->kind], z->root, before >= 0 ? z->like : NULL,
+    txs_sequence(c, z->share[t->kind], t->root, before >= 0 ? l->types[before].root : NULL,
                  txs_lay_rows(layout, t->kind) * layout->labels, 0, TXS_LAY_SCALE, TXS_NONE);
-    if (!c->bad && !txs_lay_unroot(layout, t, z->root)) c->bad = 1;
+    if (!c->bad && !txs_lay_unround(layout, t)) c->bad = 1;
 }
 
 /* Returns 0 if there is no memory. */

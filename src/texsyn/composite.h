@@ -287,9 +287,11 @@ static int txs_cross_unround(txs_type *t) {
 }
 
 /* Round what was measured to what a file keeps, and read that again, so that saving loses nothing. */
-static txm_status txs_composite_settle(const texsyn_composite *c, txm_env *env,
-                                       texsyn_composite **out) {
+static txm_status txs_composite_settle(texsyn_composite *c, txm_env *env, texsyn_composite **out) {
     size_t size = 0;
+    for (int i = 0; i < c->layout.levels; i++)
+        for (int k = 0; k < c->layout.level[i].type_count; k++)
+            txs_lay_round(&c->layout, &c->layout.level[i].types[k]);
     for (int i = 0; i < c->levels; i++) {
         for (int k = 0; k < c->labels; k++)
             for (int j = 0; j < c->model[k]->level[i].type_count; j++)

@@ -14,7 +14,6 @@ enum { TXS_LAY_SIDE_BITS = 24 };
 typedef struct txs_composite_codec {
     txs_context place[2], share[4][8];
     txs_context cross_place[2], cross_share[8];
-    int16_t root[TXS_LAY_BINS], like[TXS_LAY_BINS];
     txs_codec model;
 } txs_composite_codec;
 
@@ -38,11 +37,9 @@ static void txs_code_lay_type(txs_coder *c, txs_composite_codec *z, const txs_la
         c->bad = 1;
     if (c->bad) return;
     while (before >= 0 && l->types[before].kind != t->kind) before--;
-    txs_lay_roots(layout, t, z->root);
-    if (before >= 0) txs_lay_roots(layout, &l->types[before], z->like);
-    txs_sequence(c, z->share[t->kind], z->root, before >= 0 ? z->like : NULL,
+    txs_sequence(c, z->share[t->kind], t->root, before >= 0 ? l->types[before].root : NULL,
                  txs_lay_rows(layout, t->kind) * layout->labels, 0, TXS_LAY_SCALE, TXS_NONE);
-    if (!c->bad && !txs_lay_unroot(layout, t, z->root)) c->bad = 1;
+    if (!c->bad && !txs_lay_unround(layout, t)) c->bad = 1;
 }
 
 /* Returns 0 if there is no memory. */

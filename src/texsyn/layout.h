@@ -40,6 +40,7 @@ enum { TXS_LAY_FIELD, TXS_LAY_PAIR, TXS_LAY_PARENT, TXS_LAY_RING };
 typedef struct txs_lay_type {
     int kind, dx, dy; /* of a ring, dx is the distance */
     int32_t share[TXS_LAY_BINS];
+    int16_t root[TXS_LAY_BINS]; /* as a file keeps it, see txs_lay_round */
 } txs_lay_type;
 
 typedef struct txs_lay_level {
@@ -234,24 +235,24 @@ static int txs_lay_rows(const txs_layout *layout, int kind) {
     return kind == TXS_LAY_RING ? TXS_LAY_AROUND + 1 : layout->labels;
 }
 
-/* Round a share to what is kept: its root in steps, beside each other without the empty columns. */
-static void txs_lay_roots(const txs_layout *layout, const txs_lay_type *t, int16_t *root) {
+/* Round shares to what is kept: roots in steps, beside each other without the empty columns. */
+static void txs_lay_round(const txs_layout *layout, txs_lay_type *t) {
     const int rows = txs_lay_rows(layout, t->kind);
     for (int i = 0; i < rows * layout->labels; i++) {
         const int32_t share = t->share[i / layout->labels * TXS_MAX_LABELS + i % layout->labels];
-        root[i] =
+        t->root[i] =
             (int16_t)floor(sqrt((double)share / (double)TXS_ONE) * (double)TXS_LAY_SCALE + 0.5);
     }
 }
 
 /* The inverse, normalised as txs_lay_normalise has it; 0 for an empty histogram. */
-static int txs_lay_unroot(const txs_layout *layout, txs_lay_type *t, const int16_t *root) {
+static int txs_lay_unround(const txs_layout *layout, txs_lay_type *t) {
     const txs_lay_view view = {NULL, NULL, layout->field};
     const int rows = txs_lay_rows(layout, t->kind);
     int32_t square[TXS_LAY_BINS] = {0}, total = 0;
     for (int i = 0; i < rows * layout->labels; i++) {
-        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = root[i] * root[i];
-        total += root[i] * root[i];
+        square[i / layout->labels * TXS_MAX_LABELS + i % layout->labels] = t->root[i] * t->root[i];
+        total += t->root[i] * t->root[i];
     }
     txs_lay_normalise(&view, t, square, t->share);
     return total > 0;

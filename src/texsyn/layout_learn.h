@@ -300,7 +300,7 @@ done:
 static double txs_lay_order(const txs_lay_plane *map, int field, int labels) {
     int32_t count[TXS_LAY_BINS];
     const txs_lay_view view = {map, NULL, field};
-    const txs_lay_type type = {TXS_LAY_FIELD, 0, 0, {0}};
+    const txs_lay_type type = {TXS_LAY_FIELD, 0, 0, {0}, {0}};
     const double total = (double)txs_lay_count(&view, &type, count);
     double mutual = 0, entropy = 0, share[TXS_MAX_LABELS] = {0};
     for (int i = 0; i < TXS_LAY_BINS; i++) share[i % TXS_MAX_LABELS] += count[i] / total;
