@@ -13864,7 +13864,8 @@ static int txi_canvas_make(const txi_filler *f, int level, txi_canvas *t, txm_ar
     memcpy(t->color, l->color, 4 * n);
     t->price = (uint32_t)((double)f->style.detail_weight * l->clamp * (double)TXI_PATCH_AREA /
                           (double)TXI_WORTH_MOST * 65536);
-    t->reach = 1 + txi_level_hole_width(l) * TXI_REPEAT_REACH / 2;
+    /* beside lines a copy from near by is what continues them */
+    t->reach = f->plan ? 1 : 1 + txi_level_hole_width(l) * TXI_REPEAT_REACH / 2;
     t->toll = (uint32_t)(TXI_REPEAT_WEIGHT * l->clamp * (double)TXI_PATCH_AREA /
                          (double)TXI_WORTH_MOST * 65536);
     t->seed = txm_hash(f->seed * 16 + (uint64_t)level);
