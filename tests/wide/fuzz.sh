@@ -14,7 +14,7 @@ build/texkit composite "$tmp/parts.png" --labels "$tmp/parts-labels.png" -o "$tm
     --types 3 --save "$tmp/seeds/parts.txc" --quiet
 
 runs=20000
-[ "$FULL" = 1 ] && runs=200000
+[ "$FULL" = 1 ] && runs=60000
 check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
     tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_standalone" -lm &&
     check "$runs mutated models and composites" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*
@@ -25,8 +25,8 @@ build() {
     check "fuzz_texsyn_$1 builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -DTEXSYN_IMPLEMENTED \
         -ffp-contract=off -I. "tests/wide/fuzz/fuzz_texsyn_$1.c" "$OUT/modules/texsyn.o" -o "$OUT/fuzz_$1" -lm
 }
-runs=500
-[ "$FULL" = 1 ] && runs=5000
+runs=100
+[ "$FULL" = 1 ] && runs=500
 build weather && check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
 build fill && check "$runs random fillings" "$OUT/fuzz_fill" $runs
 build knit && check "$runs random knits" "$OUT/fuzz_knit" $runs
