@@ -20,6 +20,7 @@ static int bench_left_out;
 #define TXI_LEFT_OUT bench_left_out
 #define TEXINPAINT_IMPLEMENTATION
 #include "texinpaint.h"
+#include "texinpaint/config.h" /* the steps that can be left out */
 
 #include "bench.h"
 #include "files/mesh_io.h"
