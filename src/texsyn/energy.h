@@ -1,7 +1,7 @@
 #ifndef TEXSYN_ENERGY_H
 #define TEXSYN_ENERGY_H
 
-#include "config.h"
+#include "model.h"
 
 /* ---- energy of a pixel -------------------------------------------------------------------
 

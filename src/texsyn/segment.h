@@ -1,6 +1,7 @@
 #ifndef TEXSYN_SEGMENT_H
 #define TEXSYN_SEGMENT_H
 
+#include "learn.h"
 #include "labels.h"
 
 /* ---- segmentation -------------------------------------------------------------------------

@@ -116,10 +116,10 @@ static int run_knit(int argc, char **argv) {
     const cli_option options[] = {
         {CLI_INPUT, "--layout", "L", "a picture of A's size: white where B goes", &j.layout, 0, 0},
         {CLI_INT, "--zone", "N",
-         "pixels made anew on either side of the border, 1 to 64; default 6, 3 if one texture",
+         "pixels made anew on either side, 1 to 64; default 6, 3 if one texture",
          &j.desc.zone, 1, LONGEST_ZONE},
         {CLI_TEXT, "--roughness", "R",
-         "pixels that the border is displaced by, 0 (as drawn) to 32; default: as the grain is",
+         "pixels that the border moves, 0 (as drawn) to 32; default: as the grain is",
          &j.roughness, 0, 0},
         {CLI_TEXT, "--textures", "HOW", "auto, same or different; default auto", &j.likeness, 0, 0},
         {CLI_INPUT, "--border", "E", "a picture in which the two textures meet", &j.border, 0, 0},
