@@ -3221,7 +3221,21 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
     return 0;
 }
 
-/* ---- public: learning ------------------------------------------------------------------- */
+/* ---- pictures and masks ----------------------------------------------------------------- */
+
+static size_t txs_pixels_of(int width, int height) {
+    return (size_t)width * (size_t)height;
+}
+
+/* gray times alpha is at least half: the rule for masks */
+static int txs_is_white(const txm_image *mask, int x, int y) {
+    const txm_image m = txm_image_resolve(*mask);
+    double v = (double)txm_image_get(&m, x, y, 0);
+    if (m.channels >= 3)
+        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
+    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
+    return v >= 0.5;
+}
 
 /* no float sample is NaN or larger than LIMITS says */
 static int txs_image_is_moderate(const txm_image *image) {
@@ -3233,6 +3247,21 @@ static int txs_image_is_moderate(const txm_image *image) {
     }
     return 1;
 }
+
+static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
+                                 txm_env *env) {
+    if (!mask->pixels) return TXM_OK;
+    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (mask->width != image->width || mask->height != image->height)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name, "must be # x # like its picture",
+                                   (uint64_t)image->width, (uint64_t)image->height);
+    if (!txm_image_is_finite(mask))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
+    return TXM_OK;
+}
+
+/* ---- public: learning ------------------------------------------------------------------- */
 
 static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
     txm_status status;
@@ -3287,8 +3316,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.stride = s->width;
         s->canvas.plane = (ptrdiff_t)pixels;
         s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels + 1);
-        if (arena->failed)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
             for (int y = 0; y < s->height && s->mask; y++)
                 memcpy(s->mask + (size_t)y * (size_t)s->width, txm_image_row_const(&desc->mask, y),
@@ -3316,7 +3344,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
     }
     for (int i = m->levels - 2; i >= 0; i--) {
         txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
-                       m->bands);
+                        m->bands);
         if (!txs_cut_labels(&m->level[i], &source[i], m->bands, arena))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         txs_fill_labels(&m->level[i], &source[i].canvas, m->bands);
@@ -6053,48 +6081,6 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
     return status;
 }
 
-/* ---- pictures and masks ----------------------------------------------------------------- */
-
-static size_t txs_pixels_of(int width, int height) {
-    return (size_t)width * (size_t)height;
-}
-
-/* gray times alpha is at least half: the rule for masks */
-static int txs_is_white(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    double v = (double)txm_image_get(&m, x, y, 0);
-    if (m.channels >= 3)
-        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
-    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
-    return v >= 0.5;
-}
-
-/* all samples finite and at most a million */
-static int txs_is_plain(const txm_image *image) {
-    const txm_image im = txm_image_resolve(*image);
-    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
-        for (int x = 0; x < im.width; x++) {
-            for (int c = 0; c < im.channels; c++)
-                if (!(fabs((double)txm_image_get(&im, x, y, c)) <= 1e6)) return 0;
-        }
-    }
-    return 1;
-}
-
-static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
-                                 txm_env *env) {
-    if (!mask->pixels) return TXM_OK;
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
-                                   "must be # x # like its picture", (uint64_t)image->width,
-                                   (uint64_t)image->height);
-    if (!txm_image_is_finite(mask))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
-    return TXM_OK;
-}
-
 /* ---- the border of a knit ----------------------------------------------------------------
 
    Two pictures, and for each pixel the label of the one that it is taken from: 0 or 1. The border
@@ -6626,7 +6612,7 @@ static txm_status txs_knit_check_picture(const txm_image *image, const char *nam
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "2 channels; give 1, 3 or 4");
     if (image->width < TXS_KNIT_LEAST || image->height < TXS_KNIT_LEAST)
         return txm_fail_at(env, TXM_TOO_SMALL, name, "must be 16 x 16 or larger");
-    if (!txs_is_plain(image))
+    if (!txs_image_is_moderate(image))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
                            "has samples that are not finite or beyond a million");
     return TXM_OK;
@@ -8410,7 +8396,8 @@ static txm_status txs_see_scene(txs_segmenter *g) {
     txm_status status = TXM_OK;
     s->factor = 1;
     while (((int64_t)im->width + s->factor - 1) / s->factor *
-               (((int64_t)im->height + s->factor - 1) / s->factor) > TXS_WORK)
+               (((int64_t)im->height + s->factor - 1) / s->factor) >
+           TXS_WORK)
         s->factor++;
     s->width = (im->width + s->factor - 1) / s->factor;
     s->height = (im->height + s->factor - 1) / s->factor;
@@ -11193,7 +11180,7 @@ static txm_status txs_check_relight(const texsyn_relight_desc *d, txm_env *env) 
         txm_status status = txm_image_check(images[k], names[k], TEXSYN_MAX_PIXELS, env);
         if (status == TXM_OK) status = txs_check_mask(masks[k], images[k], mask_names[k], env);
         if (status != TXM_OK) return status;
-        if (!txs_is_plain(images[k]))
+        if (!txs_image_is_moderate(images[k]))
             return txm_fail_at(env, TXM_BAD_ARGUMENT, names[k],
                                "has samples that are not finite or beyond a million");
     }
@@ -11289,7 +11276,7 @@ static txm_status txs_check_lit(const txm_image *image, const txm_image *out, tx
     if (to.width != from.width || to.height != from.height || to.channels != from.channels)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
                            "must have the size and the channels of the image");
-    if (!txs_is_plain(&from))
+    if (!txs_image_is_moderate(&from))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image",
                            "has samples that are not finite or beyond a million");
     return TXM_OK;
@@ -12098,7 +12085,7 @@ static txm_status txs_check_erosion(const texsyn_erosion_desc *d, txm_env *env) 
     if (status != TXM_OK) return status;
     if (!(d->share >= 0 && d->share <= TXS_MOST_SHARE))
         return txm_fail(env, TXM_BAD_ARGUMENT, "share must be 0 (default) to 0.5");
-    if (!txs_is_plain(&d->weathered))
+    if (!txs_image_is_moderate(&d->weathered))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "weathered",
                            "has samples that are not finite or beyond a million");
     if (d->weathered.width < TXS_LEAST_STONE || d->weathered.height < TXS_LEAST_STONE)

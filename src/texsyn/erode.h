@@ -30,7 +30,7 @@ static txm_status txs_check_erosion(const texsyn_erosion_desc *d, txm_env *env) 
     if (status != TXM_OK) return status;
     if (!(d->share >= 0 && d->share <= TXS_MOST_SHARE))
         return txm_fail(env, TXM_BAD_ARGUMENT, "share must be 0 (default) to 0.5");
-    if (!txs_is_plain(&d->weathered))
+    if (!txs_image_is_moderate(&d->weathered))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "weathered",
                            "has samples that are not finite or beyond a million");
     if (d->weathered.width < TXS_LEAST_STONE || d->weathered.height < TXS_LEAST_STONE)

@@ -48,7 +48,7 @@ static txm_status txs_knit_check_picture(const txm_image *image, const char *nam
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "2 channels; give 1, 3 or 4");
     if (image->width < TXS_KNIT_LEAST || image->height < TXS_KNIT_LEAST)
         return txm_fail_at(env, TXM_TOO_SMALL, name, "must be 16 x 16 or larger");
-    if (!txs_is_plain(image))
+    if (!txs_image_is_moderate(image))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
                            "has samples that are not finite or beyond a million");
     return TXM_OK;

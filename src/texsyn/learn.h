@@ -2,19 +2,9 @@
 #define TEXSYN_LEARN_H
 
 #include "file.h"
+#include "mask.h"
 
 /* ---- public: learning ------------------------------------------------------------------- */
-
-/* no float sample is NaN or larger than LIMITS says */
-static int txs_image_is_moderate(const txm_image *image) {
-    const txm_image im = txm_image_resolve(*image);
-    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
-        const float *row = (const float *)txm_image_row_const(&im, y);
-        for (size_t i = 0; i < (size_t)im.width * (size_t)im.channels; i++)
-            if (!txm_is_finite((double)row[i]) || !(fabsf(row[i]) <= 1e6f)) return 0;
-    }
-    return 1;
-}
 
 static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
     txm_status status;
@@ -69,8 +59,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.stride = s->width;
         s->canvas.plane = (ptrdiff_t)pixels;
         s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels + 1);
-        if (arena->failed)
-            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
+        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
             for (int y = 0; y < s->height && s->mask; y++)
                 memcpy(s->mask + (size_t)y * (size_t)s->width, txm_image_row_const(&desc->mask, y),
@@ -98,7 +87,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
     }
     for (int i = m->levels - 2; i >= 0; i--) {
         txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
-                       m->bands);
+                        m->bands);
         if (!txs_cut_labels(&m->level[i], &source[i], m->bands, arena))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         txs_fill_labels(&m->level[i], &source[i].canvas, m->bands);

@@ -19,14 +19,13 @@ static int txs_is_white(const txm_image *mask, int x, int y) {
     return v >= 0.5;
 }
 
-/* all samples finite and at most a million */
-static int txs_is_plain(const txm_image *image) {
+/* no float sample is NaN or larger than LIMITS says */
+static int txs_image_is_moderate(const txm_image *image) {
     const txm_image im = txm_image_resolve(*image);
     for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
-        for (int x = 0; x < im.width; x++) {
-            for (int c = 0; c < im.channels; c++)
-                if (!(fabs((double)txm_image_get(&im, x, y, c)) <= 1e6)) return 0;
-        }
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < (size_t)im.width * (size_t)im.channels; i++)
+            if (!txm_is_finite((double)row[i]) || !(fabsf(row[i]) <= 1e6f)) return 0;
     }
     return 1;
 }
@@ -37,9 +36,8 @@ static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, 
     const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name,
-                                   "must be # x # like its picture", (uint64_t)image->width,
-                                   (uint64_t)image->height);
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name, "must be # x # like its picture",
+                                   (uint64_t)image->width, (uint64_t)image->height);
     if (!txm_image_is_finite(mask))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
     return TXM_OK;

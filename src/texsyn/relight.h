@@ -246,7 +246,7 @@ static txm_status txs_check_relight(const texsyn_relight_desc *d, txm_env *env) 
         txm_status status = txm_image_check(images[k], names[k], TEXSYN_MAX_PIXELS, env);
         if (status == TXM_OK) status = txs_check_mask(masks[k], images[k], mask_names[k], env);
         if (status != TXM_OK) return status;
-        if (!txs_is_plain(images[k]))
+        if (!txs_image_is_moderate(images[k]))
             return txm_fail_at(env, TXM_BAD_ARGUMENT, names[k],
                                "has samples that are not finite or beyond a million");
     }
@@ -342,7 +342,7 @@ static txm_status txs_check_lit(const txm_image *image, const txm_image *out, tx
     if (to.width != from.width || to.height != from.height || to.channels != from.channels)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
                            "must have the size and the channels of the image");
-    if (!txs_is_plain(&from))
+    if (!txs_image_is_moderate(&from))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image",
                            "has samples that are not finite or beyond a million");
     return TXM_OK;

@@ -1,8 +1,8 @@
 #ifndef TEXSYN_SEGMENT_H
 #define TEXSYN_SEGMENT_H
 
-#include "learn.h"
 #include "labels.h"
+#include "mask.h"
 
 /* ---- segmentation -------------------------------------------------------------------------
 
@@ -96,7 +96,8 @@ static txm_status txs_see_scene(txs_segmenter *g) {
     txm_status status = TXM_OK;
     s->factor = 1;
     while (((int64_t)im->width + s->factor - 1) / s->factor *
-               (((int64_t)im->height + s->factor - 1) / s->factor) > TXS_WORK)
+               (((int64_t)im->height + s->factor - 1) / s->factor) >
+           TXS_WORK)
         s->factor++;
     s->width = (im->width + s->factor - 1) / s->factor;
     s->height = (im->height + s->factor - 1) / s->factor;
