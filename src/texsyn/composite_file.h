@@ -192,6 +192,16 @@ static texsyn_composite *txs_composite_copy(const texsyn_composite *from, txm_en
     return c;
 }
 
+typedef struct txs_described_composite {
+    texsyn_composite *composite;
+    txs_composite_codec *codec;
+} txs_described_composite;
+
+static void txs_describe_composite(txs_coder *c, void *what) {
+    txs_described_composite *m = (txs_described_composite *)what;
+    txs_code_composite(c, m->composite, m->codec);
+}
+
 TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, txm_env *env,
                                             void *buffer, size_t capacity, size_t *size) {
     if (!composite || !size)
@@ -200,24 +210,9 @@ TEXSYN_API txm_status texsyn_composite_save(const texsyn_composite *composite, t
     txs_composite_codec *z = (txs_composite_codec *)txm_alloc(env, sizeof *z);
     texsyn_composite *copy = z ? txs_composite_copy(composite, env) : NULL;
     if (!copy) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to save the composite");
-    for (int writing = 0; writing < (buffer ? 2 : 1) && status == TXM_OK; writing++) {
-        uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
-        txs_coder c;
-        memset(&c, 0, sizeof c);
-        c.version = 1; /* of the labels' models: pictures of several textures have no filters */
-        c.out = bytes;
-        c.size = capacity;
-        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'C'), txs_put(&c, '1');
-        txs_coder_start(&c);
-        txs_code_composite(&c, copy, z);
-        txs_coder_finish(&c);
-        *size = c.at + TXS_CRC_BYTES;
-        if (buffer && capacity < *size)
-            status = txm_fail(env, TXM_TOO_SMALL, "save: the buffer is smaller than *size says");
-        if (!writing || status != TXM_OK) continue;
-        const uint32_t crc = txs_crc(bytes, c.at);
-        for (int i = 0; i < TXS_CRC_BYTES; i++) bytes[c.at + (size_t)i] = (uint8_t)(crc >> 8 * i);
-    }
+    txs_described_composite what = {copy, z};
+    if (copy) /* version 1 is that of the labels' models too, which have no filters */
+        status = txs_write("TXC", 1, txs_describe_composite, &what, env, buffer, capacity, size);
     texsyn_composite_free(copy);
     txm_free(env, z);
     return status;
@@ -230,27 +225,17 @@ TEXSYN_API txm_status texsyn_composite_load(const void *data, size_t size, txm_e
     if (!data || !out) return txm_fail(env, TXM_BAD_ARGUMENT, "load: data or out is NULL");
     if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || memcmp(bytes, "TXC1", TXS_MAGIC_BYTES) != 0)
         return txm_fail(env, TXM_BAD_DATA, "not a texsyn composite");
-    size -= TXS_CRC_BYTES;
-    uint32_t crc = 0;
-    for (int i = 0; i < TXS_CRC_BYTES; i++) crc |= (uint32_t)bytes[size + (size_t)i] << 8 * i;
-    if (size > TXS_MAX_FILE || crc != txs_crc(bytes, size))
+    if (!txs_is_intact(bytes, size))
         return txm_fail(env, TXM_BAD_DATA, "the composite is damaged or cut short");
 
     txm_arena arena;
     txm_arena_init(&arena, env);
     texsyn_composite *m = (texsyn_composite *)txm_arena_zero(&arena, 1, sizeof *m);
     txs_composite_codec *z = (txs_composite_codec *)txm_alloc(env, sizeof *z);
-    txs_coder c;
+    txs_coder c = txs_reader(bytes, size);
     int enough = m && z;
     if (m) m->arena = arena;
-    memset(&c, 0, sizeof c);
-    c.version = 1;
-    c.reading = 1;
-    c.in = bytes;
-    c.at = TXS_MAGIC_BYTES;
-    c.size = size;
     if (enough) {
-        txs_coder_start(&c);
         enough = txs_code_composite(&c, m, z);
         c.bad |= c.at != c.size; /* the coder reads just what was written */
     }

@@ -347,6 +347,66 @@ static uint32_t txs_crc(const uint8_t *bytes, size_t count) {
     return ~crc;
 }
 
+/* Does the file end in the CRC of what comes before? */
+static int txs_is_intact(const uint8_t *bytes, size_t size) {
+    uint32_t crc = 0;
+    if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || size - TXS_CRC_BYTES > TXS_MAX_FILE) return 0;
+    size -= TXS_CRC_BYTES;
+    for (int i = 0; i < TXS_CRC_BYTES; i++) crc |= (uint32_t)bytes[size + (size_t)i] << 8 * i;
+    return crc == txs_crc(bytes, size);
+}
+
+/* A coder that reads a file; the last of the magic bytes is the version. */
+static txs_coder txs_reader(const uint8_t *bytes, size_t size) {
+    txs_coder c;
+    memset(&c, 0, sizeof c);
+    c.reading = 1;
+    c.version = bytes[TXS_MAGIC_BYTES - 1] - '0';
+    c.in = bytes;
+    c.at = TXS_MAGIC_BYTES;
+    c.size = size - TXS_CRC_BYTES;
+    txs_coder_start(&c);
+    return c;
+}
+
+/* What has a description that serves for both directions, as txs_code_model is one. */
+typedef void txs_described(txs_coder *c, void *what);
+
+/* Write a file: magic bytes with the version, the code, the CRC. See texsyn_save. */
+static txm_status txs_write(const char *magic, int version, txs_described *describe, void *what,
+                            txm_env *env, void *buffer, size_t capacity, size_t *size) {
+    for (int writing = 0; writing < (buffer ? 2 : 1); writing++) {
+        uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
+        txs_coder c;
+        memset(&c, 0, sizeof c);
+        c.out = bytes;
+        c.version = version;
+        c.size = capacity;
+        for (int i = 0; i < TXS_MAGIC_BYTES - 1; i++) txs_put(&c, (uint8_t)magic[i]);
+        txs_put(&c, (uint8_t)('0' + version));
+        txs_coder_start(&c);
+        describe(&c, what);
+        txs_coder_finish(&c);
+        *size = c.at + TXS_CRC_BYTES;
+        if (buffer && capacity < *size)
+            return txm_fail(env, TXM_TOO_SMALL, "save: the buffer is smaller than *size says");
+        if (!writing) continue;
+        const uint32_t crc = txs_crc(bytes, c.at);
+        for (int i = 0; i < TXS_CRC_BYTES; i++) bytes[c.at + (size_t)i] = (uint8_t)(crc >> 8 * i);
+    }
+    return TXM_OK;
+}
+
+typedef struct txs_described_model {
+    texsyn_model *model;
+    txs_codec *codec;
+} txs_described_model;
+
+static void txs_describe_model(txs_coder *c, void *what) {
+    txs_described_model *m = (txs_described_model *)what;
+    txs_code_model(c, m->model, m->codec);
+}
+
 /* ---- public: models --------------------------------------------------------------------- */
 
 TEXSYN_API void texsyn_model_free(texsyn_model *model) {
@@ -370,10 +430,9 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
     txs_type *types =
         (txs_type *)txm_arena_alloc(&arena, TXS_MAX_TYPES * TXS_MAX_LEVELS, sizeof *types);
     texsyn_model *copy = (texsyn_model *)txm_arena_alloc(&arena, 1, sizeof *copy);
-    txm_status status = TXM_OK;
     if (arena.failed) {
-        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to save the model");
-        goto done;
+        txm_arena_free(&arena);
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to save the model");
     }
     *copy = *model; /* the coder stores what it codes, so it works on a copy */
     for (int i = 0; i < model->levels; i++) {
@@ -381,26 +440,9 @@ TEXSYN_API txm_status texsyn_save(const texsyn_model *model, txm_env *env, void 
         copy->level[i].types = types + i * TXS_MAX_TYPES;
         memcpy(copy->level[i].types, l->types, sizeof *types * (size_t)l->type_count);
     }
-    for (int writing = 0; writing < (buffer ? 2 : 1) && status == TXM_OK; writing++) {
-        uint8_t *bytes = writing ? (uint8_t *)buffer : NULL; /* the first time only to count */
-        txs_coder c;
-        memset(&c, 0, sizeof c);
-        c.out = bytes;
-        c.version = copy->version;
-        c.size = capacity;
-        txs_put(&c, 'T'), txs_put(&c, 'X'), txs_put(&c, 'S'),
-            txs_put(&c, (uint8_t)('0' + copy->version));
-        txs_coder_start(&c);
-        txs_code_model(&c, copy, z);
-        txs_coder_finish(&c);
-        *size = c.at + TXS_CRC_BYTES;
-        if (buffer && capacity < *size)
-            status = txm_fail(env, TXM_TOO_SMALL, "save: the buffer is smaller than *size says");
-        if (!writing) continue;
-        const uint32_t crc = txs_crc(bytes, c.at);
-        for (int i = 0; i < TXS_CRC_BYTES; i++) bytes[c.at + (size_t)i] = (uint8_t)(crc >> 8 * i);
-    }
-done:
+    txs_described_model what = {copy, z};
+    const txm_status status =
+        txs_write("TXS", copy->version, txs_describe_model, &what, env, buffer, capacity, size);
     txm_arena_free(&arena);
     return status;
 }
@@ -412,24 +454,15 @@ TEXSYN_API txm_status texsyn_load(const void *data, size_t size, txm_env *env, t
     if (size < TXS_MAGIC_BYTES + TXS_CRC_BYTES || (memcmp(bytes, "TXS1", TXS_MAGIC_BYTES) != 0 &&
                                                    memcmp(bytes, "TXS2", TXS_MAGIC_BYTES) != 0))
         return txm_fail(env, TXM_BAD_DATA, "not a texsyn model");
-    size -= TXS_CRC_BYTES;
-    uint32_t crc = 0;
-    for (int i = 0; i < TXS_CRC_BYTES; i++) crc |= (uint32_t)bytes[size + (size_t)i] << 8 * i;
-    if (size > TXS_MAX_FILE || crc != txs_crc(bytes, size))
+    if (!txs_is_intact(bytes, size))
         return txm_fail(env, TXM_BAD_DATA, "the model is damaged or cut short");
 
     texsyn_model *m = txs_model_make(env);
     txs_codec *z = (txs_codec *)txm_alloc(env, sizeof *z);
-    txs_coder c;
+    txs_coder c = txs_reader(bytes, size);
     int enough = m && z;
-    memset(&c, 0, sizeof c);
-    c.reading = 1;
-    c.in = bytes;
-    c.at = TXS_MAGIC_BYTES;
-    c.size = size;
     if (enough) {
-        m->version = c.version = bytes[TXS_MAGIC_BYTES - 1] - '0';
-        txs_coder_start(&c);
+        m->version = c.version;
         enough = txs_code_model(&c, m, z);
         c.bad |= c.at != c.size; /* the coder reads just what was written */
     }
