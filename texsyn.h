@@ -3809,6 +3809,66 @@ static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
     }
 }
 
+/* The bands of a texture: principal components of its visible colours; alpha is a band if it varies.
+   mask: a byte for each pixel of the picture, not 0 where the texture is; of these, the fully
+   transparent ones are taken out, unless all are, when any colour will do. */
+static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t *mask) {
+    const int pixels = im->width * im->height;
+    txs_source s;
+    int visible = 0, hidden = 0;
+    for (int i = 0; i < pixels && m->channels == 4; i++) {
+        const int is_seen = txm_image_get(im, i % im->width, i / im->width, 3) > 0;
+        visible += mask[i] && is_seen;
+        hidden += mask[i] && !is_seen;
+    }
+    for (int i = 0; i < pixels && visible; i++)
+        if (!(txm_image_get(im, i % im->width, i / im->width, 3) > 0)) mask[i] = 0;
+    memset(&s, 0, sizeof s);
+    s.width = im->width;
+    s.height = im->height;
+    s.mask = mask;
+    txs_find_bands(m, im, &s);
+    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+}
+
+/* Those of the source pixels of a label; im is as large as the ground. mask: scratch, as above. */
+static void txs_ground_find_bands(const txs_ground *g, const txm_image *im, int label,
+                                  texsyn_model *m, uint8_t *mask) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    for (size_t i = 0; i < pixels; i++)
+        mask[i] = g->state[i] == TXS_SOURCE && g->label[i] == label;
+    txs_find_visible_bands(m, im, mask);
+}
+
+/* Set a pixel's values to those of its samples in the bands of a model; a transparent one has no
+   colour, which is the mean one. */
+static void txs_ground_set(txs_ground *g, size_t at, const texsyn_model *m, const float sample[4]) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    double c[4] = {0, 0, 0, 0};
+    for (int k = 0; k < m->channels; k++)
+        c[k] = 255.0 * (double)sample[k] - (double)m->mean[k];
+    if (m->channels == 4 && !(sample[3] > 0)) c[0] = c[1] = c[2] = 0;
+    for (int b = 0; b < m->bands; b++) {
+        double v = 0;
+        for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
+        g->value[(size_t)b * pixels + at] = txm_float(v);
+    }
+}
+
+/* Set all pixels that are known, each in the bands of its label's model. */
+static void txs_ground_split(txs_ground *g, const txm_image *im, texsyn_model *const *model) {
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            float sample[4] = {0, 0, 0, 0};
+            if (g->state[i] == TXS_FREE || g->label[i] == TXS_NO_LABEL) continue;
+            const texsyn_model *m = model[g->label[i]];
+            for (int k = 0; k < m->channels; k++) sample[k] = txm_image_get(im, x, y, k);
+            txs_ground_set(g, i, m, sample);
+        }
+    }
+}
+
 /* How the bands of a label are quantised: from its source pixels. Returns how many these are; with
    fewer than 2 nothing is set. dither: NULL, or receives the share of a step that is filled.
    scratch: bands floats and bands bytes for each pixel of the ground. */
@@ -5710,52 +5770,6 @@ static void txs_pane_narrow(txs_pane *p, int32_t *distance) {
         if (g->state[i] == TXS_SOURCE && distance[i] > p->margin) g->state[i] = TXS_KNOWN;
 }
 
-/* The bands of the picture: principal components of the visible colours; alpha is a band if it
-   varies. Visible: not fully transparent. mask: a byte for each pixel of the window. */
-static void txs_pane_find_bands(txs_pane *p, uint8_t *mask) {
-    const txs_ground *g = &p->ground[0];
-    texsyn_model *m = p->model;
-    txs_source s;
-    int visible = 0, hidden = 0;
-    for (int i = 0; i < g->width * g->height; i++) {
-        mask[i] = g->state[i] == TXS_SOURCE;
-        if (!mask[i] || m->channels < 4) continue;
-        mask[i] = txm_image_get(&p->view, i % g->width, i / g->width, 3) > 0;
-        visible += mask[i];
-        hidden += !mask[i];
-    }
-    if (m->channels == 4 && !visible) /* all is transparent: any colour will do */
-        for (int i = 0; i < g->width * g->height; i++) mask[i] = g->state[i] == TXS_SOURCE;
-    memset(&s, 0, sizeof s);
-    s.width = g->width;
-    s.height = g->height;
-    s.mask = mask;
-    txs_find_bands(m, &p->view, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
-}
-
-/* Values of the known pixels in bands; a transparent pixel has no colour, which is the mean one. */
-static void txs_pane_split(txs_pane *p) {
-    txs_ground *g = &p->ground[0];
-    const texsyn_model *m = p->model;
-    const size_t pixels = (size_t)g->width * (size_t)g->height;
-    for (int y = 0; y < g->height; y++) {
-        for (int x = 0; x < g->width; x++) {
-            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
-            double c[4] = {0, 0, 0, 0};
-            if (g->state[i] == TXS_FREE) continue;
-            for (int k = 0; k < m->channels; k++)
-                c[k] = 255.0 * (double)txm_image_get(&p->view, x, y, k) - (double)m->mean[k];
-            if (m->channels == 4 && !(txm_image_get(&p->view, x, y, 3) > 0)) c[0] = c[1] = c[2] = 0;
-            for (int b = 0; b < m->bands; b++) {
-                double v = 0;
-                for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
-                g->value[(size_t)b * pixels + i] = txm_float(v);
-            }
-        }
-    }
-}
-
 /* Room for a model with all its types. */
 static texsyn_model *txs_fill_model_make(txm_arena *arena, int channels) {
     texsyn_model *m = (texsyn_model *)txm_arena_zero(arena, 1, sizeof *m);
@@ -5879,8 +5893,8 @@ static txm_status txs_pane_prepare(const txs_filler *f, txs_pane *p, const texsy
     txs_pane_narrow(p, scratch);
     int levels = txs_hole_levels(width);
     if (known && levels > known->levels) levels = known->levels;
-    if (!known) txs_pane_find_bands(p, p->reached);
-    txs_pane_split(p);
+    if (!known) txs_ground_find_bands(&g[0], &p->view, 0, p->model, p->reached);
+    txs_ground_split(&g[0], &p->view, &p->model);
     for (p->levels = 1; p->levels < levels; p->levels++) {
         const txs_ground *fine = &g[p->levels - 1];
         txs_ground *coarse = &g[p->levels];
@@ -6841,20 +6855,12 @@ typedef struct txs_loom { /* what a window works with */
     float spread[TXS_KNIT_TWO][TXS_MAX_BANDS];
 } txs_loom;
 
-/* The values of a pixel in the bands of a label's model; a transparent one has the mean colour. */
+/* The values of a pixel in the bands of a label's model. */
 static void txs_loom_split(const txs_loom *w, const txs_pair_of_pictures *p, int label, int x, int y,
                            txs_ground *g, size_t at) {
-    const texsyn_model *m = w->model[label];
-    const size_t pixels = txs_pixels_of(g->width, g->height);
-    double c[4] = {0, 0, 0, 0};
-    for (int i = 0; i < m->channels; i++)
-        c[i] = 255.0 * (double)txs_pair_get(p, label, x, y, i) - (double)m->mean[i];
-    if (m->channels == 4 && !(txs_pair_get(p, label, x, y, 3) > 0)) c[0] = c[1] = c[2] = 0;
-    for (int b = 0; b < m->bands; b++) {
-        double v = 0;
-        for (int i = 0; i < m->channels; i++) v += (double)m->basis[b][i] * c[i];
-        g->value[(size_t)b * pixels + at] = txm_float(v);
-    }
+    float sample[4] = {0, 0, 0, 0};
+    for (int i = 0; i < w->model[label]->channels; i++) sample[i] = txs_pair_get(p, label, x, y, i);
+    txs_ground_set(g, at, w->model[label], sample);
 }
 
 /* Where the textures are learned: the two pictures side by side, each on its own side if that is
@@ -6903,31 +6909,17 @@ static txm_image txs_loom_cut(const txs_loom *w, int label, txm_arena *arena) {
     return view;
 }
 
-/* The bands of a label: principal components of its visible colours; see txs_pane_find_bands. */
+/* The bands of a label, whose picture lies in the source beside the other's. mask: a byte for each
+   pixel of the view. */
 static void txs_loom_find_bands(const txs_loom *w, int label, const txm_image *view,
                                 uint8_t *mask) {
     const txs_ground *g = &w->source;
-    texsyn_model *m = w->model[label];
-    txs_source s;
-    int visible = 0, hidden = 0;
-    for (int pass = 0; pass < 2; pass++) { /* if nothing is visible, any colour will do */
-        for (int i = 0; i < view->width * view->height && (!pass || !visible); i++) {
-            const int x = i % view->width, y = i / view->width;
-            const size_t at = (size_t)y * (size_t)g->width +
-                              (size_t)(x + label * (view->width + TXS_KNIT_GAP));
-            const int is_seen =
-                pass || m->channels < 4 || txm_image_get(view, x, y, 3) > 0;
-            mask[i] = g->label[at] == label && is_seen;
-            visible += mask[i] && !pass;
-            hidden += g->label[at] == label && !is_seen;
-        }
+    for (int i = 0; i < view->width * view->height; i++) {
+        const int x = i % view->width, y = i / view->width;
+        mask[i] = g->label[(size_t)y * (size_t)g->width +
+                           (size_t)(x + label * (view->width + TXS_KNIT_GAP))] == label;
     }
-    memset(&s, 0, sizeof s);
-    s.width = view->width;
-    s.height = view->height;
-    s.mask = mask;
-    txs_find_bands(m, view, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+    txs_find_visible_bands(w->model[label], view, mask);
 }
 
 /* The textures of the window: bands and how they are quantised. */
@@ -9845,54 +9837,6 @@ static texsyn_composite *txs_composite_make(txm_env *env, int channels, int labe
 
 /* ---- learning a composite: the example ------------------------------------------------------- */
 
-/* The bands of a label: principal components of its visible pixels. mask: a byte a pixel. */
-static void txs_composite_bands(const txs_composer *w, int label, uint8_t *mask) {
-    const txs_ground *g = &w->source[0];
-    texsyn_model *m = w->composite->model[label];
-    const size_t pixels = (size_t)g->width * (size_t)g->height;
-    txs_source s;
-    size_t visible = 0, hidden = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        mask[i] = g->label[i] == label;
-        if (!mask[i] || m->channels < 4) continue;
-        mask[i] = txm_image_get(&w->example, (int)(i % (size_t)g->width),
-                                (int)(i / (size_t)g->width), 3) > 0;
-        visible += mask[i];
-        hidden += !mask[i];
-    }
-    if (m->channels == 4 && !visible) /* all is transparent: any colour will do */
-        for (size_t i = 0; i < pixels; i++) mask[i] = g->label[i] == label;
-    memset(&s, 0, sizeof s);
-    s.width = g->width;
-    s.height = g->height;
-    s.mask = mask;
-    txs_find_bands(m, &w->example, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
-}
-
-/* The example's pixels in the bands of their labels; a transparent pixel has the mean colour. */
-static void txs_composite_split(const txs_composer *w) {
-    const txs_ground *g = &w->source[0];
-    const size_t pixels = (size_t)g->width * (size_t)g->height;
-    for (int y = 0; y < g->height; y++) {
-        for (int x = 0; x < g->width; x++) {
-            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
-            double c[4] = {0, 0, 0, 0};
-            if (g->label[i] == TXS_NO_LABEL) continue;
-            const texsyn_model *m = w->composite->model[g->label[i]];
-            for (int k = 0; k < m->channels; k++)
-                c[k] = 255.0 * (double)txm_image_get(&w->example, x, y, k) - (double)m->mean[k];
-            if (m->channels == 4 && !(txm_image_get(&w->example, x, y, 3) > 0))
-                c[0] = c[1] = c[2] = 0;
-            for (int b = 0; b < m->bands; b++) {
-                double v = 0;
-                for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
-                g->value[(size_t)b * pixels + i] = txm_float(v);
-            }
-        }
-    }
-}
-
 /* A level on which a label has too few pixels: it is of one colour there, the mean. */
 static void txs_composite_blank(texsyn_model *m, int index) {
     txs_level *l = &m->level[index];
@@ -9923,8 +9867,9 @@ static txm_status txs_composite_prepare(txs_composer *w, txm_arena *arena, txm_e
     uint8_t *bytes = (uint8_t *)txm_arena_alloc(arena, pixels, (size_t)c->channels);
     float *values = (float *)txm_arena_alloc(arena, pixels, (size_t)c->channels * sizeof *values);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
-    for (int k = 0; k < c->labels; k++) txs_composite_bands(w, k, bytes);
-    txs_composite_split(w);
+    for (int k = 0; k < c->labels; k++)
+        txs_ground_find_bands(&g[0], &w->example, k, c->model[k], bytes);
+    txs_ground_split(&g[0], &w->example, c->model);
     c->levels = 1;
     while (c->levels < TXS_MAX_LEVELS && side >> c->levels >= TXS_COMPOSITE_TOP) {
         const txs_ground *fine = &g[c->levels - 1];

@@ -65,54 +65,6 @@ static texsyn_composite *txs_composite_make(txm_env *env, int channels, int labe
 
 /* ---- learning a composite: the example ------------------------------------------------------- */
 
-/* The bands of a label: principal components of its visible pixels. mask: a byte a pixel. */
-static void txs_composite_bands(const txs_composer *w, int label, uint8_t *mask) {
-    const txs_ground *g = &w->source[0];
-    texsyn_model *m = w->composite->model[label];
-    const size_t pixels = (size_t)g->width * (size_t)g->height;
-    txs_source s;
-    size_t visible = 0, hidden = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        mask[i] = g->label[i] == label;
-        if (!mask[i] || m->channels < 4) continue;
-        mask[i] = txm_image_get(&w->example, (int)(i % (size_t)g->width),
-                                (int)(i / (size_t)g->width), 3) > 0;
-        visible += mask[i];
-        hidden += !mask[i];
-    }
-    if (m->channels == 4 && !visible) /* all is transparent: any colour will do */
-        for (size_t i = 0; i < pixels; i++) mask[i] = g->label[i] == label;
-    memset(&s, 0, sizeof s);
-    s.width = g->width;
-    s.height = g->height;
-    s.mask = mask;
-    txs_find_bands(m, &w->example, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
-}
-
-/* The example's pixels in the bands of their labels; a transparent pixel has the mean colour. */
-static void txs_composite_split(const txs_composer *w) {
-    const txs_ground *g = &w->source[0];
-    const size_t pixels = (size_t)g->width * (size_t)g->height;
-    for (int y = 0; y < g->height; y++) {
-        for (int x = 0; x < g->width; x++) {
-            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
-            double c[4] = {0, 0, 0, 0};
-            if (g->label[i] == TXS_NO_LABEL) continue;
-            const texsyn_model *m = w->composite->model[g->label[i]];
-            for (int k = 0; k < m->channels; k++)
-                c[k] = 255.0 * (double)txm_image_get(&w->example, x, y, k) - (double)m->mean[k];
-            if (m->channels == 4 && !(txm_image_get(&w->example, x, y, 3) > 0))
-                c[0] = c[1] = c[2] = 0;
-            for (int b = 0; b < m->bands; b++) {
-                double v = 0;
-                for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
-                g->value[(size_t)b * pixels + i] = txm_float(v);
-            }
-        }
-    }
-}
-
 /* A level on which a label has too few pixels: it is of one colour there, the mean. */
 static void txs_composite_blank(texsyn_model *m, int index) {
     txs_level *l = &m->level[index];
@@ -143,8 +95,9 @@ static txm_status txs_composite_prepare(txs_composer *w, txm_arena *arena, txm_e
     uint8_t *bytes = (uint8_t *)txm_arena_alloc(arena, pixels, (size_t)c->channels);
     float *values = (float *)txm_arena_alloc(arena, pixels, (size_t)c->channels * sizeof *values);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
-    for (int k = 0; k < c->labels; k++) txs_composite_bands(w, k, bytes);
-    txs_composite_split(w);
+    for (int k = 0; k < c->labels; k++)
+        txs_ground_find_bands(&g[0], &w->example, k, c->model[k], bytes);
+    txs_ground_split(&g[0], &w->example, c->model);
     c->levels = 1;
     while (c->levels < TXS_MAX_LEVELS && side >> c->levels >= TXS_COMPOSITE_TOP) {
         const txs_ground *fine = &g[c->levels - 1];

@@ -372,52 +372,6 @@ static void txs_pane_narrow(txs_pane *p, int32_t *distance) {
         if (g->state[i] == TXS_SOURCE && distance[i] > p->margin) g->state[i] = TXS_KNOWN;
 }
 
-/* The bands of the picture: principal components of the visible colours; alpha is a band if it
-   varies. Visible: not fully transparent. mask: a byte for each pixel of the window. */
-static void txs_pane_find_bands(txs_pane *p, uint8_t *mask) {
-    const txs_ground *g = &p->ground[0];
-    texsyn_model *m = p->model;
-    txs_source s;
-    int visible = 0, hidden = 0;
-    for (int i = 0; i < g->width * g->height; i++) {
-        mask[i] = g->state[i] == TXS_SOURCE;
-        if (!mask[i] || m->channels < 4) continue;
-        mask[i] = txm_image_get(&p->view, i % g->width, i / g->width, 3) > 0;
-        visible += mask[i];
-        hidden += !mask[i];
-    }
-    if (m->channels == 4 && !visible) /* all is transparent: any colour will do */
-        for (int i = 0; i < g->width * g->height; i++) mask[i] = g->state[i] == TXS_SOURCE;
-    memset(&s, 0, sizeof s);
-    s.width = g->width;
-    s.height = g->height;
-    s.mask = mask;
-    txs_find_bands(m, &p->view, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
-}
-
-/* Values of the known pixels in bands; a transparent pixel has no colour, which is the mean one. */
-static void txs_pane_split(txs_pane *p) {
-    txs_ground *g = &p->ground[0];
-    const texsyn_model *m = p->model;
-    const size_t pixels = (size_t)g->width * (size_t)g->height;
-    for (int y = 0; y < g->height; y++) {
-        for (int x = 0; x < g->width; x++) {
-            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
-            double c[4] = {0, 0, 0, 0};
-            if (g->state[i] == TXS_FREE) continue;
-            for (int k = 0; k < m->channels; k++)
-                c[k] = 255.0 * (double)txm_image_get(&p->view, x, y, k) - (double)m->mean[k];
-            if (m->channels == 4 && !(txm_image_get(&p->view, x, y, 3) > 0)) c[0] = c[1] = c[2] = 0;
-            for (int b = 0; b < m->bands; b++) {
-                double v = 0;
-                for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
-                g->value[(size_t)b * pixels + i] = txm_float(v);
-            }
-        }
-    }
-}
-
 /* Room for a model with all its types. */
 static texsyn_model *txs_fill_model_make(txm_arena *arena, int channels) {
     texsyn_model *m = (texsyn_model *)txm_arena_zero(arena, 1, sizeof *m);
@@ -541,8 +495,8 @@ static txm_status txs_pane_prepare(const txs_filler *f, txs_pane *p, const texsy
     txs_pane_narrow(p, scratch);
     int levels = txs_hole_levels(width);
     if (known && levels > known->levels) levels = known->levels;
-    if (!known) txs_pane_find_bands(p, p->reached);
-    txs_pane_split(p);
+    if (!known) txs_ground_find_bands(&g[0], &p->view, 0, p->model, p->reached);
+    txs_ground_split(&g[0], &p->view, &p->model);
     for (p->levels = 1; p->levels < levels; p->levels++) {
         const txs_ground *fine = &g[p->levels - 1];
         txs_ground *coarse = &g[p->levels];

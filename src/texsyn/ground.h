@@ -124,6 +124,66 @@ static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
     }
 }
 
+/* The bands of a texture: principal components of its visible colours; alpha is a band if it varies.
+   mask: a byte for each pixel of the picture, not 0 where the texture is; of these, the fully
+   transparent ones are taken out, unless all are, when any colour will do. */
+static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t *mask) {
+    const int pixels = im->width * im->height;
+    txs_source s;
+    int visible = 0, hidden = 0;
+    for (int i = 0; i < pixels && m->channels == 4; i++) {
+        const int is_seen = txm_image_get(im, i % im->width, i / im->width, 3) > 0;
+        visible += mask[i] && is_seen;
+        hidden += mask[i] && !is_seen;
+    }
+    for (int i = 0; i < pixels && visible; i++)
+        if (!(txm_image_get(im, i % im->width, i / im->width, 3) > 0)) mask[i] = 0;
+    memset(&s, 0, sizeof s);
+    s.width = im->width;
+    s.height = im->height;
+    s.mask = mask;
+    txs_find_bands(m, im, &s);
+    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+}
+
+/* Those of the source pixels of a label; im is as large as the ground. mask: scratch, as above. */
+static void txs_ground_find_bands(const txs_ground *g, const txm_image *im, int label,
+                                  texsyn_model *m, uint8_t *mask) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    for (size_t i = 0; i < pixels; i++)
+        mask[i] = g->state[i] == TXS_SOURCE && g->label[i] == label;
+    txs_find_visible_bands(m, im, mask);
+}
+
+/* Set a pixel's values to those of its samples in the bands of a model; a transparent one has no
+   colour, which is the mean one. */
+static void txs_ground_set(txs_ground *g, size_t at, const texsyn_model *m, const float sample[4]) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    double c[4] = {0, 0, 0, 0};
+    for (int k = 0; k < m->channels; k++)
+        c[k] = 255.0 * (double)sample[k] - (double)m->mean[k];
+    if (m->channels == 4 && !(sample[3] > 0)) c[0] = c[1] = c[2] = 0;
+    for (int b = 0; b < m->bands; b++) {
+        double v = 0;
+        for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
+        g->value[(size_t)b * pixels + at] = txm_float(v);
+    }
+}
+
+/* Set all pixels that are known, each in the bands of its label's model. */
+static void txs_ground_split(txs_ground *g, const txm_image *im, texsyn_model *const *model) {
+    for (int y = 0; y < g->height; y++) {
+        for (int x = 0; x < g->width; x++) {
+            const size_t i = (size_t)y * (size_t)g->width + (size_t)x;
+            float sample[4] = {0, 0, 0, 0};
+            if (g->state[i] == TXS_FREE || g->label[i] == TXS_NO_LABEL) continue;
+            const texsyn_model *m = model[g->label[i]];
+            for (int k = 0; k < m->channels; k++) sample[k] = txm_image_get(im, x, y, k);
+            txs_ground_set(g, i, m, sample);
+        }
+    }
+}
+
 /* How the bands of a label are quantised: from its source pixels. Returns how many these are; with
    fewer than 2 nothing is set. dither: NULL, or receives the share of a step that is filled.
    scratch: bands floats and bands bytes for each pixel of the ground. */

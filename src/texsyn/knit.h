@@ -244,20 +244,12 @@ typedef struct txs_loom { /* what a window works with */
     float spread[TXS_KNIT_TWO][TXS_MAX_BANDS];
 } txs_loom;
 
-/* The values of a pixel in the bands of a label's model; a transparent one has the mean colour. */
+/* The values of a pixel in the bands of a label's model. */
 static void txs_loom_split(const txs_loom *w, const txs_pair_of_pictures *p, int label, int x, int y,
                            txs_ground *g, size_t at) {
-    const texsyn_model *m = w->model[label];
-    const size_t pixels = txs_pixels_of(g->width, g->height);
-    double c[4] = {0, 0, 0, 0};
-    for (int i = 0; i < m->channels; i++)
-        c[i] = 255.0 * (double)txs_pair_get(p, label, x, y, i) - (double)m->mean[i];
-    if (m->channels == 4 && !(txs_pair_get(p, label, x, y, 3) > 0)) c[0] = c[1] = c[2] = 0;
-    for (int b = 0; b < m->bands; b++) {
-        double v = 0;
-        for (int i = 0; i < m->channels; i++) v += (double)m->basis[b][i] * c[i];
-        g->value[(size_t)b * pixels + at] = txm_float(v);
-    }
+    float sample[4] = {0, 0, 0, 0};
+    for (int i = 0; i < w->model[label]->channels; i++) sample[i] = txs_pair_get(p, label, x, y, i);
+    txs_ground_set(g, at, w->model[label], sample);
 }
 
 /* Where the textures are learned: the two pictures side by side, each on its own side if that is
@@ -306,31 +298,17 @@ static txm_image txs_loom_cut(const txs_loom *w, int label, txm_arena *arena) {
     return view;
 }
 
-/* The bands of a label: principal components of its visible colours; see txs_pane_find_bands. */
+/* The bands of a label, whose picture lies in the source beside the other's. mask: a byte for each
+   pixel of the view. */
 static void txs_loom_find_bands(const txs_loom *w, int label, const txm_image *view,
                                 uint8_t *mask) {
     const txs_ground *g = &w->source;
-    texsyn_model *m = w->model[label];
-    txs_source s;
-    int visible = 0, hidden = 0;
-    for (int pass = 0; pass < 2; pass++) { /* if nothing is visible, any colour will do */
-        for (int i = 0; i < view->width * view->height && (!pass || !visible); i++) {
-            const int x = i % view->width, y = i / view->width;
-            const size_t at = (size_t)y * (size_t)g->width +
-                              (size_t)(x + label * (view->width + TXS_KNIT_GAP));
-            const int is_seen =
-                pass || m->channels < 4 || txm_image_get(view, x, y, 3) > 0;
-            mask[i] = g->label[at] == label && is_seen;
-            visible += mask[i] && !pass;
-            hidden += g->label[at] == label && !is_seen;
-        }
+    for (int i = 0; i < view->width * view->height; i++) {
+        const int x = i % view->width, y = i / view->width;
+        mask[i] = g->label[(size_t)y * (size_t)g->width +
+                           (size_t)(x + label * (view->width + TXS_KNIT_GAP))] == label;
     }
-    memset(&s, 0, sizeof s);
-    s.width = view->width;
-    s.height = view->height;
-    s.mask = mask;
-    txs_find_bands(m, view, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+    txs_find_visible_bands(w->model[label], view, mask);
 }
 
 /* The textures of the window: bands and how they are quantised. */
