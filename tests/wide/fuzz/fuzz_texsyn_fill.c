@@ -7,82 +7,13 @@
    The bytes choose size, channels, depth, strides, kind of mask and source, quality, and which
    allocation fails. Known pixels must come out as they went in, and nothing after an error.     */
 #define TEXSYN_IMPLEMENTATION
-#include "texsyn.h"
+#include "fuzzkit.h"
 
 #include <stdio.h>
 
 enum { MOST_SIDE = 80, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = 16 };
 
 static long filled; /* calls that succeeded */
-
-typedef struct memory {
-    long calls, fail_at, blocks;
-} memory;
-
-static void *allocate(void *user, size_t bytes) {
-    memory *m = (memory *)user;
-    if (++m->calls == m->fail_at) return NULL;
-    void *block = malloc(bytes);
-    if (block) {
-        memset(block, 0xa5, bytes);
-        m->blocks++;
-    }
-    return block;
-}
-
-static void release(void *user, void *block) {
-    ((memory *)user)->blocks--;
-    free(block);
-}
-
-/* A picture of random form over bytes of its own; bottom-up for every other one. */
-static txm_image make_image(uint8_t *bytes, int width, int height, int channels, txm_sample sample,
-                            int choice) {
-    const size_t unit = txm_sample_bytes(sample);
-    const size_t row = ((size_t)width * (size_t)channels + (size_t)(choice / 2 % 3)) * unit;
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    im.sample = sample;
-    im.stride = choice % 2 ? -(ptrdiff_t)row : (ptrdiff_t)row;
-    im.pixels = choice % 2 ? bytes + row * (size_t)(height - 1) : bytes;
-    return im;
-}
-
-/* A mask of one of several kinds: specks, lines, a box, half, dust, or noise. */
-static int is_masked(int kind, int x, int y, int a, int b, txm_rng *rng) {
-    switch (kind % 7) {
-    case 0: return txm_rng_below(rng, 20) == 0;
-    case 1: return abs(x - y - a + 20) < 1 + b % 5;
-    case 2: return x >= a && y >= b && x < a + b && y < a + b;
-    case 3: return x > a;
-    case 4: return x % (2 + a) == 0 && y % (2 + b) == 0;
-    case 5: return x > 16 || y > 16;
-    default: return txm_rng_below(rng, 2) == 0;
-    }
-}
-
-static void draw_mask(const txm_image *mask, int kind, int a, int b, txm_rng *rng) {
-    for (int y = 0; y < mask->height; y++)
-        for (int x = 0; x < mask->width; x++) {
-            const float value = is_masked(kind, x, y, a, b, rng) ? 1.0f : 0.0f;
-            for (int c = 0; c < mask->channels; c++) txm_image_set(mask, x, y, c, value);
-        }
-}
-
-static void draw_image(const txm_image *im, int kind, txm_rng *rng) {
-    for (int y = 0; y < im->height; y++)
-        for (int x = 0; x < im->width; x++)
-            for (int c = 0; c < im->channels; c++) {
-                float v = kind % 3 == 0   ? 0.5f
-                          : kind % 3 == 1 ? txm_rng_float(rng)
-                                          : (float)((x * 7 + y * 3 + c * 11) % 32) / 31.0f;
-                if (c == 3 && kind % 2) v = (x / 4 + y / 4) % 2 ? 1.0f : 0.0f;
-                txm_image_set(im, x, y, c, v);
-            }
-}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -105,17 +36,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     env.allocate = allocate;
     env.release = release;
     env.memory_user = &m;
-    desc.image = make_image(image, width, height, channels, sample, d[8]);
-    desc.mask = make_image(mask, width, height, 1 + d[9] % 4, TXM_U8, d[9] / 4);
+    desc.image = image_over(image, width, height, channels, sample, d[8]);
+    desc.mask = image_over(mask, width, height, 1 + d[9] % 4, TXM_U8, d[9] / 4);
     if (d[10] % 2) {
-        desc.source = make_image(source, width, height, 1, TXM_U8, d[10] / 2);
+        desc.source = image_over(source, width, height, 1, TXM_U8, d[10] / 2);
         draw_mask(&desc.source, d[10] / 2, width / 2, height / 3, &rng);
     }
     desc.quality = d[11] % 8 ? d[11] % 5 - 2 : 3;
     desc.seed = d[0];
     draw_image(&desc.image, d[12], &rng);
     draw_mask(&desc.mask, d[13], d[14] % (width + 4), d[15] % (height + 4), &rng);
-    const txm_image result = make_image(out, width, height, channels, sample, d[8] / 8);
+    const txm_image result = image_over(out, width, height, channels, sample, d[8] / 8);
     memset(out, 0x5c, sizeof out);
     memcpy(before, out, sizeof out);
 

@@ -7,82 +7,13 @@
    The bytes choose sizes, channels, depth, strides, kind of layout, zone, roughness, example of a border
    and which allocation fails. Nothing may be written after an error, nor between the rows.       */
 #define TEXSYN_IMPLEMENTATION
-#include "texsyn.h"
+#include "fuzzkit.h"
 
 #include <stdio.h>
 
 enum { MOST_SIDE = 72, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = 24 };
 
 static long knitted; /* calls that succeeded */
-
-typedef struct memory {
-    long calls, fail_at, blocks;
-} memory;
-
-static void *allocate(void *user, size_t bytes) {
-    memory *m = (memory *)user;
-    if (++m->calls == m->fail_at) return NULL;
-    void *block = malloc(bytes);
-    if (block) {
-        memset(block, 0xa5, bytes);
-        m->blocks++;
-    }
-    return block;
-}
-
-static void release(void *user, void *block) {
-    ((memory *)user)->blocks--;
-    free(block);
-}
-
-/* A picture of random form over bytes of its own; bottom-up for every other one. */
-static txm_image make_image(uint8_t *bytes, int width, int height, int channels, txm_sample sample,
-                            int choice) {
-    const size_t unit = txm_sample_bytes(sample);
-    const size_t row = ((size_t)width * (size_t)channels + (size_t)(choice / 2 % 3)) * unit;
-    txm_image im;
-    memset(&im, 0, sizeof im);
-    im.width = width;
-    im.height = height;
-    im.channels = channels;
-    im.sample = sample;
-    im.stride = choice % 2 ? -(ptrdiff_t)row : (ptrdiff_t)row;
-    im.pixels = choice % 2 ? bytes + row * (size_t)(height - 1) : bytes;
-    return im;
-}
-
-/* A layout of one of several kinds: specks, lines, a box, half, dust, or noise. */
-static int is_masked(int kind, int x, int y, int a, int b, txm_rng *rng) {
-    switch (kind % 7) {
-    case 0: return txm_rng_below(rng, 20) == 0;
-    case 1: return abs(x - y - a + 20) < 1 + b % 5;
-    case 2: return x >= a && y >= b && x < a + b && y < a + b;
-    case 3: return x > a;
-    case 4: return x % (2 + a) == 0 && y % (2 + b) == 0;
-    case 5: return x > 16 || y > 16;
-    default: return txm_rng_below(rng, 2) == 0;
-    }
-}
-
-static void draw_mask(const txm_image *mask, int kind, int a, int b, txm_rng *rng) {
-    for (int y = 0; y < mask->height; y++)
-        for (int x = 0; x < mask->width; x++) {
-            const float value = is_masked(kind, x, y, a, b, rng) ? 1.0f : 0.0f;
-            for (int c = 0; c < mask->channels; c++) txm_image_set(mask, x, y, c, value);
-        }
-}
-
-static void draw_image(const txm_image *im, int kind, txm_rng *rng) {
-    for (int y = 0; y < im->height; y++)
-        for (int x = 0; x < im->width; x++)
-            for (int c = 0; c < im->channels; c++) {
-                float v = kind % 3 == 0   ? 0.5f
-                          : kind % 3 == 1 ? txm_rng_float(rng)
-                                          : (float)((x * 7 + y * 3 + c * 11) % 32) / 31.0f;
-                if (c == 3 && kind % 2) v = (x / 4 + y / 4) % 2 ? 1.0f : 0.0f;
-                txm_image_set(im, x, y, c, v);
-            }
-}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -106,16 +37,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     env.allocate = allocate;
     env.release = release;
     env.memory_user = &m;
-    desc.a = make_image(a, width, height, channels, sample, d[8]);
-    desc.b = make_image(b, d[9] % 2 ? width : 15 + d[9] / 2 % 40, height, channels, sample, d[10]);
-    desc.layout = make_image(layout, width, height, 1 + d[11] % 4, TXM_U8, d[11] / 4);
+    desc.a = image_over(a, width, height, channels, sample, d[8]);
+    desc.b = image_over(b, d[9] % 2 ? width : 15 + d[9] / 2 % 40, height, channels, sample, d[10]);
+    desc.layout = image_over(layout, width, height, 1 + d[11] % 4, TXM_U8, d[11] / 4);
     draw_image(&desc.a, d[12], &rng);
     draw_image(&desc.b, d[13], &rng);
     draw_mask(&desc.layout, d[14], d[15] % (width + 4), d[16] % (height + 4), &rng);
     if (d[17] % 3 == 0) {
         const int side = 15 + d[18] % 50;
-        desc.border = make_image(border, side, side, channels, samples[d[18] % 3], d[18]);
-        desc.border_layout = make_image(border_layout, side, side, 1, TXM_U8, d[19]);
+        desc.border = image_over(border, side, side, channels, samples[d[18] % 3], d[18]);
+        desc.border_layout = image_over(border_layout, side, side, 1, TXM_U8, d[19]);
         draw_image(&desc.border, d[13] + 1, &rng);
         draw_mask(&desc.border_layout, d[19], side / 2, side / 3, &rng);
     }
@@ -124,7 +55,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     desc.likeness = (texsyn_likeness)(d[22] % 3);
     desc.quality = d[23] % 16 ? d[23] % 3 - 2 : 3;
     desc.seed = d[0];
-    const txm_image result = make_image(out, width, height, channels, sample, d[8] / 8);
+    const txm_image result = image_over(out, width, height, channels, sample, d[8] / 8);
     memset(out, 0x5c, sizeof out);
     memcpy(before, out, sizeof out);
 

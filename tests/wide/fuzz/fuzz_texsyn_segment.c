@@ -8,7 +8,7 @@
    allocation fails. Each label must be there, by area, and nothing else; nothing is written after an
    error or beside the rows.                                                                     */
 #define TEXSYN_IMPLEMENTATION
-#include "texsyn.h"
+#include "fuzzkit.h"
 
 #include <stdio.h>
 
@@ -16,38 +16,7 @@ enum { MOST_SIDE = 200, USED = 32, PAD = 3, FILL = 0x5c };
 
 static long accepted; /* calls that succeeded */
 
-typedef struct source { /* bytes, then zeros */
-    const uint8_t *data;
-    size_t size, at;
-} source;
-
-typedef struct memory {
-    long calls, fail_at, blocks;
-} memory;
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static int pick(source *s, int count) {
-    const int high = s->at < s->size ? s->data[s->at++] : 0;
-    const int low = s->at < s->size ? s->data[s->at++] : 0;
-    return (256 * high + low) % count;
-}
-
-static void *allocate(void *user, size_t bytes) {
-    memory *m = (memory *)user;
-    if (++m->calls == m->fail_at) return NULL;
-    void *block = malloc(bytes);
-    if (block) {
-        memset(block, 0xa5, bytes);
-        m->blocks++;
-    }
-    return block;
-}
-
-static void release(void *user, void *block) {
-    ((memory *)user)->blocks--;
-    free(block);
-}
 
 /* An image of its own block, exactly as large as it must be, filled with FILL; every other one
    bottom-up. */

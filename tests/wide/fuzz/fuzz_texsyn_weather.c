@@ -8,24 +8,13 @@
    What is refused must have a message and leave the output alone. What is eroded at one level must be
    part of the next; grays must stay gray.                                                       */
 #define TEXSYN_IMPLEMENTATION
-#include "texsyn.h"
+#include "fuzzkit.h"
 
 #include <stdio.h>
 
 static long accepted; /* calls so far */
 
-typedef struct source { /* bytes, then zeros */
-    const uint8_t *data;
-    size_t size, at;
-} source;
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static int pick(source *s, int count) {
-    const int high = s->at < s->size ? s->data[s->at++] : 0;
-    const int low = s->at < s->size ? s->data[s->at++] : 0;
-    return (256 * high + low) % count;
-}
 
 static float some_number(source *s) {
     static const float odd[8] = {NAN, INFINITY, -1, 1e6f, 2e6f, -1e6f, 1e-30f, 2};
