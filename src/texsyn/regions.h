@@ -371,20 +371,20 @@ static void txs_find_cliques(txs_partition *p, const txs_standard *z, int least,
    it looks like a texture of its own, but is thinner than this, in blocks. */
 #define TXS_THINNEST 1.25
 
-/* The smallest group that is smaller than `small` or too thin for a texture, or -1. */
-static int txs_least_group(const txs_partition *p, int64_t small) {
+/* The smallest group that is smaller than `least_area` or too thin for a texture, or -1. */
+static int txs_least_group(const txs_partition *p, int64_t least_area) {
     int least = -1;
     for (int c = 0; c < p->count; c++) {
-        if (p->area[c] >= small && txs_thickness(p, c) >= TXS_THINNEST) continue;
+        if (p->area[c] >= least_area && txs_thickness(p, c) >= TXS_THINNEST) continue;
         if (least < 0 || p->area[c] < p->area[least]) least = c;
     }
     return least;
 }
 
 /* Groups that are too small or too thin join the most similar other one, the smallest first. */
-static void txs_join_least(txs_partition *p, int64_t small) {
+static void txs_join_least(txs_partition *p, int64_t least_area) {
     while (p->count > 1) {
-        const int a = txs_least_group(p, small);
+        const int a = txs_least_group(p, least_area);
         int best = -1;
         if (a < 0) return;
         for (int c = 0; c < p->count; c++) {
