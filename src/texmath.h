@@ -6,8 +6,8 @@
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
      generator, a sort, vectors, quaternions, sRGB; and the few kernels that more than one of them
      uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the minimum cut of a grid,
-     the halving of an image, the Poisson equation on a masked image, and the edge adjacency of a
-     mesh.
+     the halving of an image, means of pixels weighted by alpha and colour for those that hide
+     theirs, the Poisson equation on a masked image, and the edge adjacency of a mesh.
 
    QUICK START                                 (tests build and run this very block)
      // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
@@ -48,9 +48,10 @@
      glTF. Image rows go from top to bottom, x to the right.
 
    MEMORY
-     Five functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
-     txm_arena_zero, txm_flow_make (from an arena) and txm_poisson. txm_poisson holds
-     64 + 4 * channels bytes for each unknown pixel, and frees all of it before it returns. The
+     Seven functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
+     txm_arena_zero, txm_flow_make and txm_image_bled (from an arena), txm_image_bleed and
+     txm_poisson. The last two free all of it before they return: txm_poisson holds
+     64 + 4 * channels bytes for each unknown pixel. The
      sort, the minimum-error cut and the sides of a mesh work in the caller's memory.
 
    THREADS
@@ -84,7 +85,9 @@
      [6] G. H. Golub, C. F. Van Loan. Matrix computations, 4th ed., section 8.5 (Jacobi).
      [7] S. W. Shepperd. Quaternion from rotation matrix. J. Guidance and Control 1(3), 1978.
      [8] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
-         energy minimization in vision. IEEE PAMI 26(9), 2004.                                 */
+         energy minimization in vision. IEEE PAMI 26(9), 2004.
+     [9] S. J. Gortler, R. Grzeszczuk, R. Szeliski, M. F. Cohen. The lumigraph, section 3.4 (pull
+         and push). SIGGRAPH 1996.                                                             */
 #ifndef TEXMATH_H
 #define TEXMATH_H
 
@@ -96,6 +99,7 @@ extern "C" {
 #include "texmath/env.h"
 #include "texmath/number.h"
 #include "texmath/image.h"
+#include "texmath/alpha.h"
 #include "texmath/random.h"
 #include "texmath/vector.h"
 #include "texmath/eigen.h"
