@@ -11,19 +11,31 @@ enum { MAX_THREADS = 256 };
 
 /* ---- messages --------------------------------------------------------------------------- */
 
-int cli_fail(cli *run, int status, const char *format, ...) {
+/* One line on stderr. A file name may hold control characters; they must not reach the terminal. */
+static void print_line(cli *run, const char *mark, const char *format, va_list arguments) {
     char line[1024];
-    va_list arguments;
-    va_start(arguments, format);
     vsnprintf(line, sizeof line, format, arguments);
-    va_end(arguments);
-    /* a file name may hold control characters; the message must stay one harmless line */
     for (char *c = line; *c; c++) {
         if (iscntrl((unsigned char)*c)) *c = '?';
     }
     cli_clear_bar(run);
-    fprintf(stderr, "texkit %s: %s\n", run->manual->name, line);
+    fprintf(stderr, "texkit %s: %s%s\n", run->manual->name, mark, line);
+}
+
+int cli_fail(cli *run, int status, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    print_line(run, "", format, arguments);
+    va_end(arguments);
     return status;
+}
+
+void cli_warn(cli *run, const char *format, ...) {
+    va_list arguments;
+    if (run->quiet) return;
+    va_start(arguments, format);
+    print_line(run, "warning: ", format, arguments);
+    va_end(arguments);
 }
 
 /* ---- options ---------------------------------------------------------------------------- */

@@ -71,6 +71,8 @@ typedef struct cli {
     uint64_t seed;
     int threads, quiet;
 
+    int max_side; /* pixels: longer pictures are refused unread; 0: the readers' own limit. A
+                     command sets it before it reads */
     txm_env env; /* for the calls into the library */
 
     /* the rest belongs to cli.c, progress.c and stats.c */
@@ -97,6 +99,14 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
 int cli_fail(cli *run, int status, const char *format, ...)
 #ifdef __GNUC__
     __attribute__((format(printf, 3, 4)))
+#endif
+    ;
+
+/* Say in one line on stderr what the user may want to know, though the work goes on; not with
+   --quiet. */
+void cli_warn(cli *run, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__((format(printf, 2, 3)))
 #endif
     ;
 

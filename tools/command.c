@@ -33,12 +33,41 @@ int new_picture(cli *run, int width, int height, int channels, txm_sample sample
     return image_new(width, height, channels, sample, image) ? CLI_DONE : fail_memory(run);
 }
 
-int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image) {
+/* Who reads a picture, for its warnings. */
+typedef struct picture_reader {
+    cli *run;
+    const char *path;
+} picture_reader;
+
+static void warn_of_picture(void *user, const char *text) {
+    const picture_reader *reader = (const picture_reader *)user;
+    cli_warn(reader->run, "'%s': %s", reader->path, text);
+}
+
+int decode_picture(cli *run, const char *path, const unsigned char *bytes, size_t size, int channels,
+                   txm_sample most, txm_image *image) {
+    picture_reader reader = {run, path};
+    image_job job = {0};
     const char *why;
-    if (most == TXM_U8 ? image_read(path, channels, image, &why)
-                       : image_read_deep(path, channels, image, &why))
-        return CLI_DONE;
+    job.channels = channels;
+    job.deep = most != TXM_U8;
+    job.max_side = run->max_side;
+    job.env = &run->env;
+    job.warn = warn_of_picture;
+    job.user = &reader;
+    if (image_decode(&job, bytes, size, image, &why)) return CLI_DONE;
+    if (job.is_cancelled) return check_result(run, TXM_CANCELLED, path);
     return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
+}
+
+int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image) {
+    size_t size;
+    unsigned char *bytes = file_read(path, &size);
+    memset(image, 0, sizeof *image);
+    if (!bytes) return cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, strerror(errno));
+    const int status = decode_picture(run, path, bytes, size, channels, most, image);
+    free(bytes);
+    return status;
 }
 
 int check_extent(cli *run, const char *what, const char *path, const txm_image *image, int width,

@@ -46,6 +46,10 @@ int new_picture(cli *run, int width, int height, int channels, txm_sample sample
    the file has them. An exit status. */
 int read_picture(cli *run, const char *path, int channels, txm_sample most, txm_image *image);
 
+/* The same for the bytes of a file that was read already. */
+int decode_picture(cli *run, const char *path, const unsigned char *bytes, size_t size, int channels,
+                   txm_sample most, txm_image *image);
+
 /* Refuse a picture of another size. what: "the mask"; like: whose size it must have. */
 int check_extent(cli *run, const char *what, const char *path, const txm_image *image, int width,
                  int height, const char *like);

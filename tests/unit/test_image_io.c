@@ -24,8 +24,10 @@ static int decode(const void *bytes, size_t size, int channels, int deep, txm_im
     assert_non_null(copy);
     if (size) memcpy(copy, bytes, size);
     *why = NULL;
-    const int ok = deep ? image_decode_deep(copy, size, channels, image, why)
-                        : image_decode(copy, size, channels, image, why);
+    image_job job = {0};
+    job.channels = channels;
+    job.deep = deep;
+    const int ok = image_decode(&job, copy, size, image, why);
     free(copy);
     if (!ok) { /* one line that says why, and nothing left behind */
         assert_non_null(*why);

@@ -110,7 +110,7 @@ static const cli_manual synth_manual = {
 
 /* The input as a model: loaded if it is one, else learned from the picture. */
 static int get_model(cli *run, texsyn_model **model) {
-    const char *path = run->inputs[0], *why;
+    const char *path = run->inputs[0];
     texsyn_learn_desc learn = {0};
     char extension[8];
     size_t size;
@@ -126,8 +126,8 @@ static int get_model(cli *run, texsyn_model **model) {
         model_figures(run, *model, size);
     } else if (!strcmp(extension, ".txs") && !image_is_known(bytes, size)) {
         status = check_result(run, result, path);
-    } else if (!image_decode(bytes, size, 0, &learn.example, &why)) {
-        status = cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
+    } else if ((status = decode_picture(run, path, bytes, size, 0, TXM_U8, &learn.example))) {
+        /* said already */
     } else if (!(status = check_picture_path(run, run->output, 0, 0, learn.example.channels))) {
         cli_stage(run, "learn");
         learn.seed = run->seed;

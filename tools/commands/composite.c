@@ -156,7 +156,7 @@ static int learn(composite_job *j) {
 /* The input as a composite: loaded if it is one, else learned from the picture. */
 static int get_composite(composite_job *j) {
     cli *run = &j->run;
-    const char *path = run->inputs[0], *why;
+    const char *path = run->inputs[0];
     char extension[8];
     size_t size;
     int status = CLI_DONE;
@@ -173,8 +173,7 @@ static int get_composite(composite_job *j) {
     else if (result == TXM_OK) status = save(j);
     else if (!strcmp(extension, ".txc") && !image_is_known(bytes, size))
         status = check_result(run, result, path);
-    else if (!image_decode_deep(bytes, size, 0, &j->learn.example, &why))
-        status = cli_fail(run, CLI_FAILED, "cannot read '%s': %s", path, why);
+    else status = decode_picture(run, path, bytes, size, 0, TXM_U16, &j->learn.example);
     free(bytes);
     if (!status && !j->composite) status = learn(j);
     return status;

@@ -13,13 +13,13 @@ enum { CREASE = 50 }; /* degrees, where --crease is not given */
 /* A picture as PNG: the file itself if it is one. */
 static int read_png(retile_job *j, const char *path, txm_image *image) {
     static const unsigned char magic[] = {0x89, 'P', 'N', 'G'};
-    const char *why;
     size_t size;
     unsigned char *bytes = file_read(path, &size);
     if (!bytes) return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, strerror(errno));
-    if (!image_decode(bytes, size, 0, image, &why)) {
+    const int status = decode_picture(&j->run, path, bytes, size, 0, TXM_U8, image);
+    if (status) {
         free(bytes);
-        return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
+        return status;
     }
     if (size > sizeof magic && !memcmp(bytes, magic, sizeof magic)) {
         j->png = bytes;

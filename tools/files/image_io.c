@@ -163,32 +163,32 @@ static int decode(const unsigned char *bytes, size_t size, int channels, int dee
     return *why = "the image is damaged or cut short; get a whole copy", 0;
 }
 
-static int read_file(const char *path, int channels, int deep, txm_image *image, const char **why) {
+int image_decode(image_job *job, const unsigned char *bytes, size_t size, txm_image *image,
+                 const char **why) {
+    return decode(bytes, size, job->channels, job->deep, image, why);
+}
+
+int image_load(image_job *job, const char *path, txm_image *image, const char **why) {
     size_t size;
     unsigned char *bytes = file_read(path, &size);
     memset(image, 0, sizeof *image);
     if (!bytes) return *why = strerror(errno), 0;
-    int ok = decode(bytes, size, channels, deep, image, why);
+    const int ok = image_decode(job, bytes, size, image, why);
     free(bytes);
     return ok;
 }
 
-int image_decode(const unsigned char *bytes, size_t size, int channels, txm_image *image,
-                 const char **why) {
-    return decode(bytes, size, channels, 0, image, why);
-}
-
 int image_read(const char *path, int channels, txm_image *image, const char **why) {
-    return read_file(path, channels, 0, image, why);
-}
-
-int image_decode_deep(const unsigned char *bytes, size_t size, int channels, txm_image *image,
-                      const char **why) {
-    return decode(bytes, size, channels, 1, image, why);
+    image_job job = {0};
+    job.channels = channels;
+    return image_load(&job, path, image, why);
 }
 
 int image_read_deep(const char *path, int channels, txm_image *image, const char **why) {
-    return read_file(path, channels, 1, image, why);
+    image_job job = {0};
+    job.channels = channels;
+    job.deep = 1;
+    return image_load(&job, path, image, why);
 }
 
 int image_new(int width, int height, int channels, txm_sample sample, txm_image *image) {

@@ -21,17 +21,30 @@ void file_extension(const char *path, char extension[8]);
 /* Do these bytes begin like an image of a kind that image_decode reads? */
 int image_is_known(const unsigned char *bytes, size_t size);
 
-/* Decode a whole file; channels 0 keeps what it has, 1 converts to gray. Release the result with
-   image_free. 1 if all went well. */
-int image_decode(const unsigned char *bytes, size_t size, int channels, txm_image *image,
+/* How a picture is read or written; all zero: 8 bits a sample, the channels of the file, in silence. */
+typedef struct image_job {
+    int channels;       /* 0 keeps those of the file, 1 makes gray, 2 to 4 what it says        */
+    int deep;           /* 1 keeps 16 bits a sample if the file has them: TXM_U16, else TXM_U8 */
+    int max_side;       /* a longer side is refused before anything is decoded; 0 = 2^24       */
+    const txm_env *env; /* reports progress and cancels, nothing else of it is used; or NULL   */
+    /* Called for what is worth a line to the user, though the picture was read: one English phrase
+       that fits after "warning: 'x.jpg': ". NULL = silent.                                    */
+    void (*warn)(void *user, const char *text);
+    void *user;
+    int is_cancelled; /* out: 1 if the picture was not read or written because env said so     */
+    char text[120];   /* room for what *why says                                               */
+} image_job;
+
+/* Decode a whole file. Sizes are checked before anything is decoded. Release the result with
+   image_free. 1 if all went well; else *why says why not, which may lie in job->text.            */
+int image_decode(image_job *job, const unsigned char *bytes, size_t size, txm_image *image,
                  const char **why);
 
 /* The same from a path. */
-int image_read(const char *path, int channels, txm_image *image, const char **why);
+int image_load(image_job *job, const char *path, txm_image *image, const char **why);
 
-/* The same, but keeping the depth: TXM_U16 if the file has 16 bits per sample, else TXM_U8. */
-int image_decode_deep(const unsigned char *bytes, size_t size, int channels, txm_image *image,
-                      const char **why);
+/* The same, 8 bits and in silence; and keeping 16 bits. channels 0 keeps those of the file. */
+int image_read(const char *path, int channels, txm_image *image, const char **why);
 int image_read_deep(const char *path, int channels, txm_image *image, const char **why);
 
 /* A picture of zeros; image_free releases it. 0: no memory, or too large for any. */
