@@ -78,7 +78,8 @@ static const char *make_texture(const textiles_set *set, txm_env *env, floor_tex
     for (size_t i = 0; !failed && i < (size_t)width * (size_t)height * 3; i++)
         ((float *)t->level[0].pixels)[i] = txm_srgb_to_linear((float)bytes[i] / 255.0f);
     for (int k = 1; !failed && k < LEVELS; k++) {
-        if (txm_image_halve(&t->level[k - 1], &t->level[k], env) != TXM_OK) failed = env->message;
+        if (txm_image_halve(&t->level[k - 1], TXM_COLOR, 0, &t->level[k], env) != TXM_OK)
+            failed = env->message;
     }
     free(bytes);
     return failed;

@@ -6,7 +6,7 @@
      progress and cancel, parallel-for), checked size arithmetic, image views, a random number
      generator, a sort, vectors, quaternions, sRGB; and the few kernels that more than one of them
      uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the minimum cut of a grid,
-     the halving of an image, means of pixels weighted by alpha and colour for those that hide
+     levels of detail of an image, means of pixels weighted by alpha and colour for those that hide
      theirs, the Poisson equation on a masked image, and the edge adjacency of a mesh.
 
    QUICK START                                 (tests build and run this very block)
@@ -63,8 +63,8 @@
      is computed in double in a fixed order and rounded once, by txm_float, which works around a
      bug of gcc (vectors in double are not rounded). That gives the same bits wherever arithmetic is
      IEEE 754 (on 32-bit x86: -msse2), with -ffp-contract=off (the default of gcc -std=c99) and
-     without -ffast-math. Functions that call pow, sin, cos or acos depend on the C library in about
-     one result of 10^8 (txm_sincos and txm_exp2 do not): use them for display, not for decisions.
+     without -ffast-math. No result depends on the C library: of its functions only sqrt, fabs, floor
+     and ceil are used, which are exact.
      Sort, cut, eigenvectors and the sides of a mesh give the same result even where there are
      ties.
 
@@ -87,7 +87,8 @@
      [8] Y. Boykov, V. Kolmogorov. An experimental comparison of min-cut/max-flow algorithms for
          energy minimization in vision. IEEE PAMI 26(9), 2004.
      [9] S. J. Gortler, R. Grzeszczuk, R. Szeliski, M. F. Cohen. The lumigraph, section 3.4 (pull
-         and push). SIGGRAPH 1996.                                                             */
+         and push). SIGGRAPH 1996.
+     [10] I. Castano. Computing alpha mipmaps. The Witness (blog), 2010.                       */
 #ifndef TEXMATH_H
 #define TEXMATH_H
 
@@ -100,6 +101,7 @@ extern "C" {
 #include "texmath/number.h"
 #include "texmath/image.h"
 #include "texmath/alpha.h"
+#include "texmath/level.h"
 #include "texmath/random.h"
 #include "texmath/vector.h"
 #include "texmath/eigen.h"

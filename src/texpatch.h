@@ -92,7 +92,7 @@
    SAME BYTES
      All decisions are made in integers, or in float and double rounded once: the same bytes on any
      number of threads, with and without SIMD and on any compiler that keeps to IEEE 754 (see
-     texmath.h), built with -ffp-contract=off. The levels of texpatch_half depend on libm's pow.
+     texmath.h), built with -ffp-contract=off.
 
    REFERENCES
      [1] GPU-based interactive near-regular texture synthesis for digital human models.
@@ -250,13 +250,18 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 
 /* ---- levels of detail -------------------------------------------------------------------- */
 
-/* The next coarser level of a finished map, (width + 1) / 2 x (height + 1) / 2: the mean of 2 x 2
-   pixels, in linear light for 8- and 16-bit colours that are not data; normals are
-   renormalised; of four labels one is taken. So all levels agree with each other and with what a
-   renderer makes of level 0. map may be NULL: a picture. half is untouched after an error:
-   TXM_BAD_ARGUMENT, TXM_TOO_LARGE */
+/* The next coarser level of a finished map, max(1, width / 2) x max(1, height / 2) pixels, rounded
+   down as graphics APIs want it: the mean of the 2 x 2 pixels that each pixel covers, of odd sides
+   2 and a part, see txm_image_halve. Colours of 8 and 16 bits that are not data are averaged in
+   linear light, weighted by alpha; normals are renormalised; of labels one is taken. So all levels
+   agree with each other and with what a renderer makes of level 0. For cutouts see also
+   txm_image_set_coverage.
+
+   map       NULL: a picture
+   tileable  TEXPATCH_TILE_X | TEXPATCH_TILE_Y, as the map was made
+   half      untouched after an error: TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY     */
 TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map *map,
-                                      txm_env *env, const txm_image *half);
+                                      int tileable, txm_env *env, const txm_image *half);
 
 /* ---- the endless plane ------------------------------------------------------------------- */
 

@@ -190,6 +190,31 @@ static inline void txm_bleed_push(void *context, int y) {
     }
 }
 
+/* Make room for the pyramid of an image, which is resolved; arena->failed tells if there was none. */
+static inline void txm_bleed_begin(txm_bleed *b, const txm_image *image, int wrap,
+                                   txm_arena *arena) {
+    int width = image->width, height = image->height;
+    memset(b, 0, sizeof *b);
+    b->image = *image;
+    b->wrap = wrap;
+    b->lanes = image->channels;
+    do {
+        txm_bleed_level *to = &b->level[++b->levels];
+        to->width = width = width / 2 + width % 2;
+        to->height = height = height / 2 + height % 2;
+        to->pixels = (float *)txm_arena_alloc(arena, (size_t)width * (size_t)height,
+                                              (size_t)b->lanes * sizeof(float));
+    } while (width > 1 || height > 1);
+}
+
+static inline void txm_bleed_run(txm_bleed *b, const txm_env *env) {
+    for (b->at = 1; b->at <= b->levels; b->at++)
+        txm_parallel_for(env, b->level[b->at].height, txm_bleed_pull, b);
+    for (b->at = b->levels - 1; b->at > 0; b->at--)
+        txm_parallel_for(env, b->level[b->at].height, txm_bleed_push, b);
+    txm_parallel_for(env, b->image.height, txm_bleed_push, b);
+}
+
 /* Replace the colour of fully transparent pixels, where alpha is 0, by a smooth continuation of
    the visible pixels, so that filters which average straight colours show no fringe. Nearest are
    the colours of the visible neighbours, further away those of wider surroundings (pull and push
@@ -208,32 +233,15 @@ static inline txm_status txm_image_bleed(const txm_image *image, int wrap, txm_e
     txm_arena arena;
     txm_status status = txm_image_check(image, "image", 0, env);
     if (status != TXM_OK) return status;
-    memset(&b, 0, sizeof b);
-    b.image = txm_image_resolve(*image);
-    if (!txm_image_has_hidden(&b.image)) return TXM_OK;
-    b.wrap = wrap;
-    b.lanes = b.image.channels;
+    const txm_image im = txm_image_resolve(*image);
+    if (!txm_image_has_hidden(&im)) return TXM_OK;
     txm_arena_init(&arena, env);
-    int width = b.image.width, height = b.image.height;
-    do {
-        txm_bleed_level *to = &b.level[b.levels + 1];
-        to->width = width = width / 2 + width % 2;
-        to->height = height = height / 2 + height % 2;
-        to->pixels = (float *)txm_arena_alloc(&arena, (size_t)width * (size_t)height,
-                                              (size_t)b.lanes * sizeof(float));
-        b.levels++;
-    } while (width > 1 || height > 1);
-    if (arena.failed) {
-        txm_arena_free(&arena);
-        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to continue visible colours");
-    }
-    for (b.at = 1; b.at <= b.levels; b.at++)
-        txm_parallel_for(env, b.level[b.at].height, txm_bleed_pull, &b);
-    for (b.at = b.levels - 1; b.at > 0; b.at--)
-        txm_parallel_for(env, b.level[b.at].height, txm_bleed_push, &b);
-    txm_parallel_for(env, b.image.height, txm_bleed_push, &b);
+    txm_bleed_begin(&b, &im, wrap, &arena);
+    if (arena.failed)
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to continue visible colours");
+    else txm_bleed_run(&b, env);
     txm_arena_free(&arena);
-    return TXM_OK;
+    return status;
 }
 
 /* The image as it is if nothing is hidden in it, else a copy whose hidden colour is bled: what a

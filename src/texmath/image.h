@@ -123,54 +123,36 @@ static inline int txm_image_is_finite(const txm_image *image) {
 
 /* ---- colour ----------------------------------------------------------------------------- */
 
+/* The n-th root of x > 0, n 2 or more, to an ulp or two: a guess from the exponent, then Newton. Sums,
+   products and quotients only, so that the bits are the same everywhere, unlike those of pow. */
+static inline double txm_root(double x, int n) {
+    const uint64_t one = (uint64_t)1023 << 52;
+    uint64_t bits;
+    double y;
+    if (!txm_is_finite(x)) return x;
+    memcpy(&bits, &x, sizeof bits);
+    bits = bits / (uint64_t)n + (one - one / (uint64_t)n); /* within 6 % */
+    memcpy(&y, &bits, sizeof y);
+    for (int i = 0; i < 5; i++) {
+        double power = y;
+        for (int k = 2; k < n; k++) power *= y;
+        y += (x / power - y) / n;
+    }
+    return y;
+}
+
 /* sRGB code value to linear light and back [5]; 0..1 to 0..1. Outside, the same curves are
-   extrapolated (below 0: the linear part); nothing is clamped. */
+   extrapolated (below 0: the linear part); nothing is clamped. x^2.4 is x^2 times the fifth root of
+   x^2, and x^(1/2.4) the twelfth root of x^5. */
 static inline float txm_srgb_to_linear(float s) {
-    return txm_float(s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4));
+    if (s <= 0.04045f) return txm_float(s / 12.92);
+    const double x = ((double)s + 0.055) / 1.055, xx = x * x;
+    return txm_float(xx * txm_root(xx, 5));
 }
 static inline float txm_linear_to_srgb(float l) {
-    return txm_float(l <= 0.0031308f ? 12.92 * l : 1.055 * pow(l, 1 / 2.4) - 0.055);
-}
-
-/* ---- kernel: half size ------------------------------------------------------------------ */
-
-/* One step of an image pyramid: each pixel of half is the mean of 2x2 pixels of image. If the
-   width is odd the last column is averaged by itself, if the height is odd the last row, so that no
-   pixel is lost. Samples are averaged as they are, so they should be linear.
-
-   image, half  float, the same channels, not overlapping; half is (width + 1) / 2 x
-                (height + 1) / 2 and receives the result, or is untouched after an error
-   return       TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                    */
-static inline txm_status txm_image_halve(const txm_image *image, const txm_image *half,
-                                         txm_env *env) {
-    txm_status status = txm_image_check(image, "image", 0, env);
-    if (status == TXM_OK) status = txm_image_check(half, "half", 0, env);
-    if (status != TXM_OK) return status;
-    const txm_image from = txm_image_resolve(*image), to = txm_image_resolve(*half);
-    if (from.sample != TXM_F32 || to.sample != TXM_F32 || from.channels != to.channels)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
-                           "image and half must both be TXM_F32 with the same channels");
-    if (to.width != from.width / 2 + from.width % 2 ||
-        to.height != from.height / 2 + from.height % 2)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "half",
-                           "its sides must be half those of image, rounded up");
-    const size_t n = (size_t)from.channels;
-    for (int y = 0; y < to.height; y++) {
-        const int rows = 2 * y + 1 < from.height ? 2 : 1;
-        const float *upper = (const float *)txm_image_row_const(&from, 2 * y);
-        const float *lower = (const float *)txm_image_row_const(&from, 2 * y + rows - 1);
-        float *out = (float *)txm_image_row(&to, y);
-        for (int x = 0; x < to.width; x++) {
-            /* at an odd border the same pixel is simply taken twice */
-            const size_t left = 2 * (size_t)x * n, right = 2 * x + 1 < from.width ? left + n : left;
-            for (size_t c = 0; c < n; c++) {
-                const double sum = ((double)upper[left + c] + upper[right + c]) +
-                                   ((double)lower[left + c] + lower[right + c]);
-                out[(size_t)x * n + c] = txm_float(sum * 0.25);
-            }
-        }
-    }
-    return TXM_OK;
+    if (l <= 0.0031308f) return txm_float(12.92 * (double)l);
+    const double x = (double)l, xx = x * x;
+    return txm_float(1.055 * txm_root(sqrt(sqrt(xx * xx * x)), 3) - 0.055);
 }
 
 #endif /* TEXMATH_IMAGE_H */

@@ -14,6 +14,9 @@
     wraps PICTURE AXES MOST            across these borders neighbours differ MOST times as inside
     joined S.pfm AXES LEAST            across these borders pieces go on LEAST times as often as inside
     half FINE COARSE HOW               COARSE is half of FINE; HOW: color, data, label, normal
+    fence FILE                         thin slanting wires of about 60,120,40, white that is hidden between
+    colored PICTURE R,G,B              wherever there is any alpha the color is this one within 9 levels
+    covered PICTURE LEVEL MOST         alpha is half or more on the same share of pixels within MOST
     darker PICTURE MASK BY             where MASK is not 0, PICTURE is darker by so much on average
     lines LINES.json LAYERS.png        the lines enclose the layers' pixels, no others
     shapes LINES.svg LINES.json        the same lines
@@ -280,7 +283,7 @@ def check_joined(sources, axes, least):
 
 def check_half(fine, coarse, how):
     f, c = Picture(fine), Picture(coarse)
-    need(c.size() == ((f.width + 1) // 2, (f.height + 1) // 2), coarse, "is", c.size())
+    need(c.size() == (max(1, f.width // 2), max(1, f.height // 2)), coarse, "is", c.size())
     need((c.channels, c.bits) == (f.channels, f.bits), coarse, "is of another kind")
 
     def linear(v):
@@ -290,24 +293,56 @@ def check_half(fine, coarse, how):
     def srgb(v):
         return f.most * (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055)
 
+    def covered(i, coarse, fine):
+        """The pixels under pixel i, and how much of each."""
+        low, high = i * fine / coarse, (i + 1) * fine / coarse
+        for k in range(int(low), math.ceil(high - 1e-9)):
+            yield k, min(high, k + 1) - max(low, k)
+
     for y in range(c.height):
         for x in range(c.width):
-            four = [f.rows[min(2 * y + j, f.height - 1)][min(2 * x + i, f.width - 1)]
-                    for j in (0, 1) for i in (0, 1)]
+            parts = [(f.rows[v][u], a * b) for v, a in covered(y, c.height, f.height)
+                     for u, b in covered(x, c.width, f.width)]
             pixel, slack = c.rows[y][x], 1 + f.most // 1000
             if how == "label":
-                need(pixel in four, pixel, "is none of", four)
+                need(pixel in [p for p, _ in parts], pixel, "is none of", parts)
                 continue
+
+            def mean(value, parts=parts):
+                return sum(w * value(p) for p, w in parts) / sum(w for _, w in parts)
             if how == "data":
-                mean = [sum(p[k] for p in four) / 4 for k in range(f.channels)]
+                want = [mean(lambda p, k=k: p[k]) for k in range(f.channels)]
             elif how == "color":
-                mean = [srgb(sum(linear(p[k]) for p in four) / 4) for k in range(f.channels)]
+                want = [srgb(mean(lambda p, k=k: linear(p[k]))) for k in range(f.channels)]
             else:
-                n = [sum(2 * p[k] / f.most - 1 for p in four) for k in range(3)]
+                n = [mean(lambda p, k=k: 2 * p[k] / f.most - 1) for k in range(3)]
                 length = math.sqrt(sum(v * v for v in n)) or 1
-                mean = [(v / length + 1) * f.most / 2 for v in n]
-            need(all(abs(a - b) <= slack for a, b in zip(pixel, mean)), "pixel", x, y, "is", pixel,
-                 "instead of", mean)
+                want = [(v / length + 1) * f.most / 2 for v in n]
+            need(all(abs(a - b) <= slack for a, b in zip(pixel, want)), "pixel", x, y, "is", pixel,
+                 "instead of", want)
+
+
+def check_fence(path):
+    def pixel(x, y):
+        tone = zlib.crc32(struct.pack("<ii", x, y)) & 3
+        wire = (x + 2 * y) % 13 < 3 or (3 * x - y) % 17 < 3
+        rim = (x + 2 * y) % 13 == 3
+        return (60 + tone, 120 + tone, 40 - tone, 255 if wire else 90) if wire or rim else (255, 255, 255, 0)
+    write_png(path, 80, 72, 4, 8, pixel)
+
+
+def check_colored(picture, color):
+    p, want = Picture(picture), [int(v) for v in color.split(",")]
+    for row in p.rows:
+        for pixel in row:
+            need(pixel[3] == 0 or all(abs(a - b) <= 9 for a, b in zip(pixel, want)), picture, "has", pixel)
+
+
+def check_covered(picture, level, most):
+    a, b = ([2 * pixel[3] >= p.most for row in p.rows for pixel in row]
+            for p in (Picture(picture), Picture(level)))
+    need(abs(sum(a) / len(a) - sum(b) / len(b)) <= float(most), level, "covers", sum(b) / len(b),
+         "of", sum(a) / len(a))
 
 
 def check_darker(picture, mask, by):

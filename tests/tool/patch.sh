@@ -189,6 +189,15 @@ check "normals stay unit vectors" $check_patch half lod-normal.png lod-normal-1.
 check "amounts of 16 bits are averaged as they are" $check_patch half lod-height.png \
     lod-height-1.png data
 
+# a fence of thin wires; white is hidden between them
+$check_patch fence fence.png
+check "--lod of a cutout" run 0 fence.png -o fence-tile.png --size 91x64 --tileable-y --lod 4
+check "--cutout" run 0 fence.png -o fence-cut.png --size 91x64 --tileable-y --lod 4 --cutout
+check "the picture itself is as without" cmp fence-tile.png fence-cut.png
+check "thin wires stay" one_by_one $check_patch covered fence-cut.png fence-cut{}.png 0.1 -- -1 -2 -3
+check "which vanish without" fails $check_patch covered fence-tile.png fence-tile-3.png 0.1
+refuses 2 "goes with --lod" bricks.png -o n.png $size --cutout
+
 # ---- guided
 check "--guide and --target" run 0 ramp.png -o g.png $size --guide ramp-guide.png \
     --target target.png --guide-weight 8

@@ -1,4 +1,4 @@
-/* test_texmath_image.c - image views, sRGB, half size, the Poisson equation on a mask
+/* test_texmath_image.c - image views, sRGB, the Poisson equation on a mask
    SPDX-License-Identifier: MIT OR Unlicense
 
    make build/tests/unit/test_texmath_image && build/tests/unit/test_texmath_image */
@@ -191,6 +191,30 @@ static void test_colour_known(void **state) {
     assert_near(txm_linear_to_srgb(1), 1, 1e-7);
 }
 
+/* roots to an ulp or two, and with them both curves as pow gives them */
+static void test_colour_roots(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(14, 0);
+    for (int i = 0; i < 20000; i++) {
+        const double x = exp(txm_rng_double(&rng) * 600 - 300);
+        for (int n = 2; n < 8; n++) {
+            double power = 1;
+            const double root = txm_root(x, n);
+            for (int k = 0; k < n; k++) power *= root;
+            assert_near(power / x, 1, 1e-14);
+        }
+        const float s = random_float(&rng, 0, i % 2 ? 1 : 100);
+        const double linear = s <= 0.04045f ? s / 12.92 : pow((s + 0.055) / 1.055, 2.4);
+        const double code = s <= 0.0031308f ? 12.92 * s : 1.055 * pow(s, 1 / 2.4) - 0.055;
+        assert_near(txm_srgb_to_linear(s) / linear, 1, 1e-7);
+        assert_near(txm_linear_to_srgb(s) / code, 1, 1e-7);
+    }
+    assert_true(txm_root(1, 5) == 1 && txm_root(1, 3) == 1);
+    assert_true(txm_srgb_to_linear(INFINITY) == INFINITY &&
+                txm_linear_to_srgb(INFINITY) == INFINITY);
+    assert_true(txm_srgb_to_linear(NAN) != txm_srgb_to_linear(NAN));
+}
+
 static void test_colour_back(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(13, 0);
@@ -202,61 +226,6 @@ static void test_colour_back(void **state) {
         const float s = (float)v / 255.0f;
         assert_int_equal((int)(txm_linear_to_srgb(txm_srgb_to_linear(s)) * 255 + 0.5f), v);
     }
-}
-
-/* ---- half size -------------------------------------------------------------------------- */
-
-static void test_halve(void **state) {
-    (void)state;
-    enum { MOST = 9 };
-    static float pixels[MOST * MOST * 4], small[5 * 5 * 4];
-    txm_rng rng = txm_rng_make(16, 0);
-    for (int w = 1; w <= MOST; w++) {
-        for (int h = 1; h <= MOST; h++) {
-            for (int c = 1; c <= 4; c++) {
-                txm_image im = view(pixels, w, h, c, TXM_F32);
-                txm_image half = view(small, (w + 1) / 2, (h + 1) / 2, c, TXM_F32);
-                for (int i = 0; i < w * h * c; i++) pixels[i] = txm_rng_float(&rng);
-                assert_int_equal(txm_image_halve(&im, &half, NULL), TXM_OK);
-                for (int y = 0; y < half.height; y++) {
-                    for (int x = 0; x < half.width; x++) {
-                        for (int k = 0; k < c; k++) {
-                            double sum = 0, n = 0;
-                            for (int v = 2 * y; v < h && v < 2 * y + 2; v++) {
-                                for (int u = 2 * x; u < w && u < 2 * x + 2; u++) {
-                                    sum += txm_image_get(&im, u, v, k);
-                                    n++;
-                                }
-                            }
-                            assert_near(txm_image_get(&half, x, y, k), sum / n, 1e-7);
-                        }
-                    }
-                }
-            }
-        }
-    }
-    txm_env env;
-    memset(&env, 0, sizeof env);
-    const txm_image im = view(pixels, 9, 8, 1, TXM_F32), good = view(small, 5, 4, 1, TXM_F32);
-    memset(small, 0, sizeof small);
-    txm_image bad[8];
-    for (int i = 0; i < 8; i++) bad[i] = good;
-    bad[0].pixels = NULL;
-    bad[1].width = 4;
-    bad[2].height = 5;
-    bad[3].channels = 2;
-    bad[4].sample = TXM_U16;
-    bad[5].width = 6;
-    bad[6].stride = 4;
-    bad[7].channels = 9;
-    for (int i = 0; i < 8; i++) {
-        env.message[0] = 0;
-        assert_int_equal(txm_image_halve(&im, &bad[i], &env), TXM_BAD_ARGUMENT);
-        assert_memory_equal(env.message, "half: ", 6);
-    }
-    assert_int_equal(txm_image_halve(NULL, &good, &env), TXM_BAD_ARGUMENT);
-    assert_int_equal(txm_image_halve(&im, NULL, &env), TXM_BAD_ARGUMENT);
-    for (int i = 0; i < 20; i++) assert_true(small[i] == 0);
 }
 
 /* ---- Poisson ---------------------------------------------------------------------------- */
@@ -537,18 +506,12 @@ static void test_same_bytes(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_image_check),
-        cmocka_unit_test(test_image_samples),
-        cmocka_unit_test(test_image_finite),
-        cmocka_unit_test(test_colour_known),
-        cmocka_unit_test(test_colour_back),
-        cmocka_unit_test(test_halve),
-        cmocka_unit_test(test_poisson_harmonic),
-        cmocka_unit_test(test_poisson_equation),
-        cmocka_unit_test(test_poisson_simple),
-        cmocka_unit_test(test_poisson_bad),
-        cmocka_unit_test(test_poisson_memory),
-        cmocka_unit_test(test_poisson_cancel),
+        cmocka_unit_test(test_image_check),      cmocka_unit_test(test_image_samples),
+        cmocka_unit_test(test_image_finite),     cmocka_unit_test(test_colour_known),
+        cmocka_unit_test(test_colour_roots),     cmocka_unit_test(test_colour_back),
+        cmocka_unit_test(test_poisson_harmonic), cmocka_unit_test(test_poisson_equation),
+        cmocka_unit_test(test_poisson_simple),   cmocka_unit_test(test_poisson_bad),
+        cmocka_unit_test(test_poisson_memory),   cmocka_unit_test(test_poisson_cancel),
         cmocka_unit_test(test_same_bytes),
     };
     return cmocka_run_group_tests_name("texmath images", tests, NULL, NULL);

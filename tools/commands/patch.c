@@ -33,7 +33,10 @@ static const cli_manual patch_manual = {
     "  elsewhere, -1 leaves it free; disturb, 0 to 4, is how much of the roughness of EXEMPLAR's\n"
     "  edges the strokes take on.\n"
     "--window X,Y,W,H is a part of an endless plane; all windows show the same plane.\n"
-    "--lod K writes K coarser levels, each half as wide: OUT-1.png, OUT-2.png ...\n"
+    "--lod K writes K coarser levels: OUT-1.png, OUT-2.png ... Each is half as wide and high,\n"
+    "  rounded down, as graphics APIs want it. Colors are averaged in linear light. With --cutout\n"
+    "  the same share of pixels as in OUT has an alpha of at least half, so that leaves and fences\n"
+    "  that are drawn with an alpha test neither thin out nor close up.\n"
     "--sources FILE.pfm says where each pixel comes from, in three floats: x and y in the\n"
     "  exemplar; and 8 times the exemplar's number (EXEMPLAR is 0), plus 4 if it is mirrored,\n"
     "  plus the number of counter-clockwise quarter turns, or -1 if the pixel was kept.\n"
@@ -171,6 +174,8 @@ static int run_job(patch_job *j, int argc, char **argv) {
          0},
         {CLI_INT, "--lod", "K", "coarser levels to write, each half as wide", &j->lod, 0,
          MAX_LEVELS},
+        {CLI_FLAG, "--cutout", NULL, "coarser levels keep the share of pixels that an alpha test draws",
+         &j->cutout, 0, 0},
         {CLI_OUTPUT, "--sources", "FILE.pfm", "where each pixel comes from", &j->sources, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };

@@ -205,22 +205,46 @@ static int encode(patch_job *j, const txm_image *image, int index, cli_file *fil
     return status;
 }
 
+/* Encode level image of a cutout: its alpha scaled to the coverage of the picture. */
+static int encode_cutout(patch_job *j, const txm_image *image, double coverage, int index,
+                         cli_file *file, unsigned char **bytes) {
+    txm_image level;
+    int status = new_picture(&j->run, image->width, image->height, image->channels, image->sample,
+                             &level);
+    if (status) return status;
+    memcpy(level.pixels, image->pixels,
+           (size_t)image->width * (size_t)image->height * (size_t)image->channels *
+               txm_sample_bytes(image->sample));
+    status = check_result(&j->run, txm_image_set_coverage(&level, coverage, 0.5f, &j->run.env),
+                          j->run.inputs[0]);
+    if (!status) status = encode(j, &level, index, file, bytes);
+    free(level.pixels);
+    return status;
+}
+
 /* Encode a map and its coarser levels; each level is released once the next one is made. */
 static int encode_levels(patch_job *j, int map, cli_file *files, unsigned char **bytes) {
     const int first = map * (1 + j->lod);
+    const texpatch_map *kind = &j->maps[map];
+    const int is_color = !kind->is_normal && !kind->is_label && !kind->is_data;
     txm_image *image = &j->out[map];
+    const int is_cutout = j->cutout && is_color && txm_image_has_alpha(image);
+    const double coverage = is_cutout ? txm_image_coverage(image, 0.5f) : 1;
     int status = encode(j, image, first, &files[first], &bytes[first]);
     for (int level = 1; level <= j->lod && !status; level++) {
         const int i = first + level;
         txm_image half;
-        status = new_picture(&j->run, (image->width + 1) / 2, (image->height + 1) / 2,
-                             image->channels, image->sample, &half);
+        status = new_picture(&j->run, txm_level_side(image->width, 1),
+                             txm_level_side(image->height, 1), image->channels, image->sample, &half);
         if (!status)
-            status = check_result(&j->run, texpatch_half(image, &j->maps[map], &j->run.env, &half),
-                                  j->run.inputs[0]);
+            status = check_result(
+                &j->run, texpatch_half(image, kind, j->desc.tileable, &j->run.env, &half),
+                j->run.inputs[0]);
         free(image->pixels);
         *image = half;
-        if (!status) status = encode(j, image, i, &files[i], &bytes[i]);
+        if (!status && is_cutout)
+            status = encode_cutout(j, image, coverage, i, &files[i], &bytes[i]);
+        else if (!status) status = encode(j, image, i, &files[i], &bytes[i]);
     }
     return status;
 }

@@ -186,10 +186,12 @@ int patch_check_options(patch_job *j) {
     if (!j->kept_list != !j->keep)
         return cli_fail(run, CLI_USAGE, "--keep and --keep-mask go together; give both");
     int coarser = 0;
-    for (int side = w > h ? w : h; side > 1; side = (side + 1) / 2) coarser++;
+    while (txm_level_side(w > h ? w : h, coarser) > 1) coarser++;
     if (j->lod > coarser)
         return cli_fail(run, CLI_USAGE, "--lod %d: %d x %d pixels have %d coarser levels", j->lod,
                         w, h, coarser);
+    if (j->cutout && !j->lod)
+        return cli_fail(run, CLI_USAGE, "--cutout goes with --lod, whose levels it is for");
     if (j->sources) {
         char extension[8];
         file_extension(j->sources, extension);

@@ -60,8 +60,8 @@ static int mips_make(mips *m, const txm_image *texture) {
     while (m->count < MAX_LEVELS) {
         const txm_image *last = &m->levels[m->count - 1];
         if (last->width == 1 && last->height == 1) break;
-        if (!add_level(m, (last->width + 1) / 2, (last->height + 1) / 2)) return 0;
-        if (txm_image_halve(last, &m->levels[m->count - 1], &env) != TXM_OK) return 0;
+        if (!add_level(m, txm_level_side(last->width, 1), txm_level_side(last->height, 1))) return 0;
+        if (txm_image_halve(last, TXM_COLOR, 0, &m->levels[m->count - 1], &env) != TXM_OK) return 0;
     }
     return 1;
 }

@@ -113,13 +113,36 @@ static uint64_t flow(txm_env *env) {
 }
 
 static uint64_t halve(txm_env *env) {
-    static float from[63 * 50 * 3], to[32 * 25 * 3];
+    static float from[63 * 50 * 4], to[31 * 25 * 4];
+    uint64_t hash = 0;
     txm_rng rng = txm_rng_make(4, 4);
-    for (int i = 0; i < 63 * 50 * 3; i++) from[i] = txm_rng_float(&rng) * 3 - 1;
-    const txm_image image = golden_image(from, 63, 50, 3, TXM_F32);
-    const txm_image half = golden_image(to, 32, 25, 3, TXM_F32);
-    golden_need(txm_image_halve(&image, &half, env), "halve", env);
-    return tk_hash(0, to, sizeof to);
+    for (int i = 0; i < 63 * 50 * 4; i++) from[i] = txm_rng_float(&rng) * 3 - 1;
+    for (int kind = 0; kind < 3; kind++) { /* RGB and RGBA of light, normals */
+        const int channels = kind == 1 ? 4 : 3;
+        const txm_image image = golden_image(from, 63, 50, channels, TXM_F32);
+        const txm_image half = golden_image(to, 31, 25, channels, TXM_F32);
+        golden_need(txm_image_halve(&image, kind == 2 ? TXM_NORMALS : TXM_COLOR, 0, &half, env),
+                    "halve", env);
+        hash = tk_hash(hash, to, (size_t)(31 * 25 * channels) * sizeof(float));
+    }
+    return hash;
+}
+
+/* levels and hidden colour of a cutout of 16 bits that tiles */
+static uint64_t cutout(txm_env *env) {
+    static uint16_t from[61 * 40 * 4], to[30 * 20 * 4];
+    const txm_image image = golden_image(from, 61, 40, 4, TXM_U16);
+    const txm_image half = golden_image(to, 30, 20, 4, TXM_U16);
+    txm_rng rng = txm_rng_make(4, 5);
+    for (int i = 0; i < 61 * 40 * 4; i++) {
+        from[i] = (uint16_t)(txm_rng_next(&rng) & 0xffff);
+        if (i % 4 == 3 && i / 44 % 3) from[i] = i % 7 ? 0 : 9000;
+    }
+    golden_need(txm_image_halve(&image, TXM_COLOR, 3, &half, env), "halve", env);
+    golden_need(txm_image_set_coverage(&half, txm_image_coverage(&image, 0.5f), 0.5f, env),
+                "coverage", env);
+    golden_need(txm_image_bleed(&image, TXM_WRAP_X, env), "bleed", env);
+    return tk_hash(tk_hash(0, to, sizeof to), from, sizeof from);
 }
 
 static uint64_t poisson_hash(float screen, int with_target, txm_env *env) {
@@ -130,7 +153,8 @@ static uint64_t poisson_hash(float screen, int with_target, txm_env *env) {
     txm_rng rng = txm_rng_make(6, 2);
     for (int i = 0; i < WIDE * HIGH; i++) {
         const int x = i % WIDE, y = i / WIDE;
-        mask[i] = (uint8_t)((x > 4 && x < 30 && y > 3 && y < 30 && (x - 15) * (y - 12) < 60) || x == 39);
+        mask[i] =
+            (uint8_t)((x > 4 && x < 30 && y > 3 && y < 30 && (x - 15) * (y - 12) < 60) || x == 39);
         for (int c = 0; c < 3; c++) {
             image[3 * i + c] = txm_rng_float(&rng);
             target[3 * i + c] = 0.1f * (txm_rng_float(&rng) - 0.5f);
@@ -217,10 +241,16 @@ static uint64_t frames(txm_env *env) {
     return hash;
 }
 
-static const golden_case cases[] = {{"random", random_numbers}, {"sort", sort},
-                                    {"eigen", eigen},           {"cut", cut},
-                                    {"flow", flow},             {"halve", halve},
-                                    {"membrane", membrane},     {"poisson", poisson},
-                                    {"samples", samples},       {"turns", turns},
+static const golden_case cases[] = {{"random", random_numbers},
+                                    {"sort", sort},
+                                    {"eigen", eigen},
+                                    {"cut", cut},
+                                    {"flow", flow},
+                                    {"halve", halve},
+                                    {"cutout", cutout},
+                                    {"membrane", membrane},
+                                    {"poisson", poisson},
+                                    {"samples", samples},
+                                    {"turns", turns},
                                     {"frames", frames}};
 GOLDEN_MAIN("texmath")
