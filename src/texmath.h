@@ -7,7 +7,8 @@
      generator, a sort, vectors, quaternions, sRGB; and the few kernels that more than one of them
      uses: eigenvectors of a symmetric 3x3 matrix, the minimum-error cut, the minimum cut of a grid,
      levels of detail of an image, means of pixels weighted by alpha and colour for those that hide
-     theirs, the Poisson equation on a masked image, and the edge adjacency of a mesh.
+     theirs, the measuring and the evening of uneven light, the Poisson equation on a masked image,
+     and the edge adjacency of a mesh.
 
    QUICK START                                 (tests build and run this very block)
      // Fill a hole in an image smoothly. cc -std=c99 quick.c -lm
@@ -48,11 +49,10 @@
      glTF. Image rows go from top to bottom, x to the right.
 
    MEMORY
-     Seven functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
-     txm_arena_zero, txm_flow_make and txm_image_bled (from an arena), txm_image_bleed and
-     txm_poisson. The last two free all of it before they return: txm_poisson holds
-     64 + 4 * channels bytes for each unknown pixel. The
-     sort, the minimum-error cut and the sides of a mesh work in the caller's memory.
+     Nine functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
+     txm_arena_zero, txm_flow_make and txm_image_bled (from an arena), txm_image_bleed, txm_even,
+     txm_uneven and txm_poisson. The last four free all of it before they return: txm_poisson holds
+     64 + 4 * channels bytes for each unknown pixel. The sort, the minimum-error cut and the sides of a mesh work in the caller's memory.
 
    THREADS
      No global state. Two calls may overlap unless they share what one of them writes: an env, an
@@ -102,6 +102,7 @@ extern "C" {
 #include "texmath/image.h"
 #include "texmath/alpha.h"
 #include "texmath/level.h"
+#include "texmath/light.h"
 #include "texmath/random.h"
 #include "texmath/vector.h"
 #include "texmath/eigen.h"

@@ -91,4 +91,21 @@ static inline double txm_exp2(double x) {
     return sum * power;
 }
 
+/* log2 of x > 0, to 1e-12: by its exponent and a series. The same bits everywhere, as above. */
+static inline double txm_log2(double x) {
+    int whole;
+    x = frexp(x, &whole); /* 0.5 <= x < 1 */
+    if (x <= 0.70710678118654752) x *= 2, whole--;
+    const double t = (x - 1) / (x + 1), tt = t * t;
+    double sum = 0;
+    for (int k = 17; k > 0; k -= 2) sum = sum * tt + 1.0 / k;
+    return whole + 2 * t * sum / 0.69314718055994530942;
+}
+
+/* x^y for x >= 0 and y > 0, to 1e-10 of the result if that lies within 2^-1000 to 2^1000. The same
+   bits everywhere, as above. */
+static inline double txm_pow(double x, double y) {
+    return x > 0 ? txm_exp2(y * txm_log2(x)) : 0;
+}
+
 #endif /* TEXMATH_NUMBER_H */

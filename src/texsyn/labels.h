@@ -66,7 +66,7 @@ static void txs_texton_costs(txs_refiner *r) {
         const double more = total / (double)TXS_UNSEEN_SHARE + 1;
         for (int i = 0; i < bins; i++) {
             const double p = (total + more * bins) / ((double)bin[i] + more);
-            bin[i] = (int32_t)(txs_log2(p) * TXS_LN2 * (double)TXS_COST_UNIT + 0.5);
+            bin[i] = (int32_t)(txm_log2(p) * TXS_LN2 * (double)TXS_COST_UNIT + 0.5);
         }
     }
 }

@@ -33,21 +33,10 @@ typedef struct txs_blocks {
 
 #define TXS_LN2 0.69314718055994530942
 
-/* log2 of x >= 1 to about 1e-12, by its exponent and a series: the same everywhere */
-static double txs_log2(double x) {
-    int whole;
-    x = frexp(x, &whole); /* 0.5 <= x < 1 */
-    if (x <= 0.70710678118654752) x *= 2, whole--;
-    const double t = (x - 1) / (x + 1), tt = t * t;
-    double sum = 0;
-    for (int k = 17; k > 0; k -= 2) sum = sum * tt + 1.0 / k;
-    return whole + 2 * t * sum / TXS_LN2;
-}
-
 static void txs_log_table(int32_t *table) {
     table[0] = 0;
     for (int n = 1; n <= 2 * TXS_BLOCK_TOTAL; n++)
-        table[n] = (int32_t)((double)(n * TXS_LOG_UNIT) * txs_log2((double)n) + 0.5);
+        table[n] = (int32_t)((double)(n * TXS_LOG_UNIT) * txm_log2((double)n) + 0.5);
 }
 
 /* The Jensen-Shannon divergence of bins from..to, 0..TXS_FAR. */

@@ -282,6 +282,18 @@ static void test_exp2(void **state) {
     }
 }
 
+static void test_log2(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(7, 7);
+    for (int i = -1000; i <= 1000; i++) {
+        const double x = txm_rng_double(&rng) + 1e-9, y = txm_rng_double(&rng) * 4;
+        assert_true(txm_log2(ldexp(1, i)) == i);
+        assert_near(txm_log2(ldexp(x, i)), log2(x) + i, 1e-11);
+        assert_near(txm_pow(x, y) / pow(x, y), 1, 1e-10);
+    }
+    assert_true(txm_pow(0, 2.4) == 0);
+}
+
 static void test_lowest_bit(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(7, 7);
@@ -426,6 +438,7 @@ int main(void) {
         cmocka_unit_test(test_arena_failed),
         cmocka_unit_test(test_sincos),
         cmocka_unit_test(test_exp2),
+        cmocka_unit_test(test_log2),
         cmocka_unit_test(test_lowest_bit),
         cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_rng_known),

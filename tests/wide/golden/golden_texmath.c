@@ -200,6 +200,36 @@ static uint64_t samples(txm_env *env) {
     return hash;
 }
 
+/* uneven light of a masked picture of each type of samples: how much, and taken out */
+static uint64_t light(txm_env *env) {
+    enum { WIDE = 90, HIGH = 70 };
+    static float pixels[WIDE * HIGH * 3];
+    static uint8_t mask[WIDE * HIGH];
+    static const txm_sample samples[] = {TXM_U8, TXM_U16, TXM_F32};
+    uint64_t hash = 0;
+    for (int k = 0; k < 3; k++) {
+        txm_rng rng = txm_rng_make(13, 1);
+        txm_even_desc desc;
+        float stops = 0;
+        memset(&desc, 0, sizeof desc);
+        desc.image = golden_image(pixels, WIDE, HIGH, 3, samples[k]);
+        desc.mask = golden_image(mask, WIDE, HIGH, 1, TXM_U8);
+        for (int i = 0; i < WIDE * HIGH; i++) {
+            const int x = i % WIDE, y = i / WIDE;
+            mask[i] = (uint8_t)(x * y % 31 ? 255 : 0);
+            for (int c = 0; c < 3; c++)
+                txm_image_set(&desc.image, x, y, c,
+                              (0.1f + 0.6f * txm_rng_float(&rng)) * (float)(x + 40) / 130.0f);
+        }
+        golden_need(txm_uneven(&desc, env, &stops), "uneven", env);
+        hash = tk_hash(hash, &stops, sizeof stops);
+        desc.radius = 20;
+        golden_need(txm_even(&desc, env, &desc.image), "even", env);
+        hash = tk_hash(hash, pixels, (size_t)(WIDE * HIGH * 3) * txm_sample_bytes(samples[k]));
+    }
+    return hash;
+}
+
 static txm_vec3 rounded(txm_dvec3 v) {
     return txm_v3(txm_float(v.x), txm_float(v.y), txm_float(v.z));
 }
@@ -252,5 +282,6 @@ static const golden_case cases[] = {{"random", random_numbers},
                                     {"poisson", poisson},
                                     {"samples", samples},
                                     {"turns", turns},
-                                    {"frames", frames}};
+                                    {"frames", frames},
+                                    {"light", light}};
 GOLDEN_MAIN("texmath")
