@@ -223,7 +223,7 @@ static uint64_t plane(txm_env *env) {
 
 /* coarser levels of a picture, of a normal map and of labels */
 static uint64_t half(txm_env *env) {
-    enum { ODD = 63, HALF = 32 };
+    enum { ODD = 63, HALF = 31 };
     static uint16_t deep[ODD * ODD * 3], deep_half[HALF * HALF * 3];
     uint64_t hash = 0;
     golden_noise(exemplar[0], ODD, ODD, 3);
@@ -238,8 +238,8 @@ static uint64_t half(txm_env *env) {
         map.is_normal = kind == 1;
         map.is_label = kind == 2;
         map.is_data = kind == 3;
-        golden_need(texpatch_half(&from, kind ? &map : NULL, env, &to), "half", env);
-        golden_need(texpatch_half(&from_deep, kind ? &map : NULL, env, &to_deep), "half", env);
+        golden_need(texpatch_half(&from, kind ? &map : NULL, 0, env, &to), "half", env);
+        golden_need(texpatch_half(&from_deep, kind ? &map : NULL, 0, env, &to_deep), "half", env);
         hash = tk_hash(hash, out, HALF * HALF * 3);
         hash = tk_hash(hash, deep_half, sizeof deep_half);
     }
