@@ -12,16 +12,24 @@ OPENMP  := $(shell echo 'int main(void) { return 0; }' | \
 WARN    := -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow
 
 # -ffp-contract=off: the same bytes on machines with and without fused multiply-add
-COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -Isrc -Itools $(CPPFLAGS)
+COMPILE  = $(CC) -std=c99 $(CFLAGS) -ffp-contract=off $(OPENMP) $(WARN) -Isrc -Itools $(FORMATS) $(CPPFLAGS)
 LINK     = $(CC) $(CFLAGS) $(OPENMP) $(LDFLAGS)
 
 SOURCES := $(wildcard src/*.h src/*/*.h)
 HEADERS := $(notdir $(wildcard src/*.h))
 TEXKIT   = $(patsubst tools/%.c,$(BUILD)/%.o,\
              $(wildcard tools/*.c tools/modules/*.c tools/commands/*.c tools/files/*.c))
-IMAGES   = $(BUILD)/files/image_io.o $(BUILD)/files/stb.o
+IMAGES   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/files/image_*.c) tools/files/stb.c)
 TIMED    = $(BUILD)/env.o $(IMAGES)
 MESHES   = $(patsubst tools/%.c,$(BUILD)/%.o,$(wildcard tools/files/mesh*.c))
+# The libraries of image formats; TIFF and WebP are left out where theirs is not installed. They are looked
+# for when the first recipe wants them, which is behind the set-up, and once
+find_library = $(shell printf '\043include <%s>\nint main(void) { return 0; }\n' $(1) | \
+                 $(CC) -xc - -o /dev/null $(2) 2>/dev/null && echo $(2))
+TIFF     = $(eval TIFF := $$(call find_library,tiffio.h,-ltiff))$(TIFF)
+WEBP     = $(eval WEBP := $$(call find_library,webp/encode.h,-lwebp))$(WEBP)
+FORMATS  = $(if $(TIFF),-DTEXKIT_TIFF) $(if $(WEBP),-DTEXKIT_WEBP)
+PICTURES = -lpng -lz -ljpeg $(TIFF) $(WEBP)
 # examples/brush opens a window, which takes SDL 2; examples/forest_gl takes OpenGL, and opens a
 # window if it can. Where that is not installed they are left out
 SDL     := $(shell sdl2-config --libs 2>/dev/null)
@@ -73,19 +81,20 @@ $(BUILD)/%.o: tools/%.c Makefile | setup
 $(BUILD)/files/stb.o: COMPILE += -fno-sanitize=undefined
 
 $(BUILD)/texkit: $(TEXKIT)
-	$(LINK) $^ -o $@ -lcjson -lm
+	$(LINK) $^ -o $@ -lcjson $(PICTURES) -lm
+	@echo $(PICTURES) >$(BUILD)/files/libraries # for programs of the tests
 
 # small programs that the demo, the tests and the benchmark use
 helpers: $(BUILD)/crop $(BUILD)/draw $(BUILD)/scan $(BUILD)/shape $(BUILD)/view
 
 $(BUILD)/crop $(BUILD)/draw $(BUILD)/scan: $(BUILD)/%: $(BUILD)/helpers/%.o $(IMAGES)
-	$(LINK) $^ -o $@ -lm
+	$(LINK) $^ -o $@ $(PICTURES) -lm
 
 $(BUILD)/shape: $(BUILD)/helpers/shape.o
 	$(LINK) $^ -o $@ -lm
 
 $(BUILD)/view: $(addprefix $(BUILD)/helpers/,view.o render.o) $(MESHES) $(IMAGES)
-	$(LINK) $^ -o $@ -lm
+	$(LINK) $^ -o $@ $(PICTURES) -lm
 
 # ---- examples and benchmarks
 
@@ -93,12 +102,12 @@ examples: $(EXAMPLES)
 
 $(BUILD)/examples/%: examples/%.c $(BUILD)/files/stb.o $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
 
 # those of more than one file have a folder of their own
 $(BUILD)/examples/%: examples/%/main.c $(BUILD)/files/stb.o $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) -lm
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
 
 $(BUILD)/examples/membrane: $(wildcard examples/membrane/*)
 $(BUILD)/examples/membrane: $(BUILD)/helpers/render.o $(MESHES) $(IMAGES)
@@ -118,13 +127,13 @@ bench: $(BENCHES) $(PLAIN) samples
 
 $(BUILD)/bench/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $< $(filter %.o,$^) -o $@ -lm
+	$(COMPILE) $< $(filter %.o,$^) -o $@ $(PICTURES) -lm
 
 # the same without SIMD, for comparison
 $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD -DTEXINPAINT_NO_SIMD \
-	    $< $(filter %.o,$^) -o $@ -lm
+	    $< $(filter %.o,$^) -o $@ $(PICTURES) -lm
 
 $(BUILD)/bench/bench_inpaint $(BUILD)/bench/plain/bench_inpaint: $(MESHES)
 

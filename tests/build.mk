@@ -37,7 +37,7 @@ $(TESTS)/asan/%.o: tools/%.c tests/build.mk | setup
 $(TESTS)/asan/files/stb.o: SANITIZE += -fno-sanitize=undefined
 
 $(TESTS)/asan/texkit: $(TEXKIT:$(BUILD)/%=$(TESTS)/asan/%)
-	$(LINK) $(SANITIZE) $^ -o $@ -lcjson -lm
+	$(LINK) $(SANITIZE) $^ -o $@ -lcjson $(PICTURES) -lm
 
 # those that look inside a module include the parts that they test, or all of it; the others hold
 # nothing that is worth optimising
@@ -48,7 +48,7 @@ $(TESTS)/unit/%.o: tests/unit/%.c tests/build.mk
 	$(TEST_C) $(SANITIZE) $(if $(strip $(call inside,$<)),-Wno-unused-function,-O0) -c $< -o $@
 
 $(TESTS)/unit/%: $(TESTS)/unit/%.o
-	$(CC) $(SANITIZE) $^ -o $@ -lcmocka -lpthread -lm
+	$(CC) $(SANITIZE) $^ -o $@ -lcmocka -lpthread $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
 
 # links.mk says which objects a unit test is linked with: those of the headers that it includes,
 # itself or by way of the kit, but for modules whose implementation it holds to see what is private

@@ -79,10 +79,13 @@ int check_extent(cli *run, const char *what, const char *path, const txm_image *
 
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size) {
+    image_job job = {0};
     const char *why;
     char extension[8];
     file_extension(path, extension);
-    if (image_encode(extension, image, bytes, size, &why)) return CLI_DONE;
+    job.env = &run->env;
+    if (image_encode(&job, extension, image, bytes, size, &why)) return CLI_DONE;
+    if (job.is_cancelled) return check_result(run, TXM_CANCELLED, path);
     return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", path, why);
 }
 
@@ -165,9 +168,9 @@ int check_picture_fits(cli *run, const char *path, int width, int height, const 
     char extension[8];
     file_extension(path, extension);
     const int status = check_picture_path(run, path, width, height, image->channels);
-    if (!status && image->sample == TXM_U16 && strcmp(extension, ".png") != 0)
-        return cli_fail(run, CLI_USAGE, "cannot write '%s': of these formats only PNG takes 16 bits "
-                        "a sample; use .png", path);
+    if (!status && image->sample == TXM_U16 && !image_takes_16_bits(extension))
+        return cli_fail(run, CLI_USAGE, "cannot write '%s': of these formats only PNG and TIFF take "
+                        "16 bits a sample; use .png", path);
     return status;
 }
 

@@ -25,6 +25,11 @@ need() { "$1" "$2" || missing="$missing $3"; }
 
 need has_header stb/stb_image.h libstb-dev
 need has_header cjson/cJSON.h libcjson-dev
+need has_header png.h libpng-dev
+need has_header jpeglib.h libjpeg-dev
+# TIFF and WebP could be left out
+need has_header tiffio.h libtiff-dev
+need has_header webp/encode.h libwebp-dev
 case $profile in test | ci)
     need has_command g++ g++
     need has_header cmocka.h libcmocka-dev

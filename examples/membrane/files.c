@@ -63,7 +63,7 @@ const char *write_scene(const membrane *m, const char *extension, const char *pa
                                   .colors = 1, .field = 30};
         txm_image picture;
         if (render(&scene, &view, &picture, &why)) {
-            image_encode(extension, &picture, &bytes, &size, &why);
+            image_encode(NULL, extension, &picture, &bytes, &size, &why);
             image_free(&picture);
         }
     } else if (!why) {

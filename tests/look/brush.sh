@@ -5,8 +5,9 @@
 
 brush=$(pwd)/build/examples/brush
 check "brush builds" make -s build/examples/brush || exit 1
+# shellcheck disable=SC2046 # words
 check "check_brush builds" $CC -std=gnu99 -O2 -Wall -Wextra -I. -Itools tests/look/check_brush.c \
-    build/files/image_io.o build/files/stb.o -o "$tmp/check_brush" -lm || exit 1
+    build/files/image_*.o build/files/stb.o -o "$tmp/check_brush" $(cat build/files/libraries) -lm || exit 1
 build/draw clouds "$tmp/clouds.png" 192
 cd "$tmp" || exit 1
 

@@ -11,7 +11,7 @@ int main(int argc, char **argv) {
     const char *why = "give IN OUT";
     int ok = argc == 3 && image_read_deep(argv[1], 0, &image, &why);
     if (ok && image.sample != TXM_U16) ok = 0, why = "not 16 bits";
-    ok = ok && image_encode(".png", &image, &bytes, &size, &why);
+    ok = ok && image_encode(NULL, ".png", &image, &bytes, &size, &why);
     if (ok) {
         FILE *file = fopen(argv[2], "wb");
         ok = file && fwrite(bytes, 1, size, file) == size;

@@ -68,7 +68,7 @@ static txm_image view(void *pixels, int channels, txm_sample sample) {
 static unsigned char *encode(const txm_image *image, size_t *size) {
     unsigned char *bytes;
     const char *why;
-    if (!image_encode(".png", image, &bytes, size, &why)) fail_msg("%s", why);
+    if (!image_encode(NULL, ".png", image, &bytes, size, &why)) fail_msg("%s", why);
     return bytes;
 }
 
@@ -102,7 +102,7 @@ static void png_round_trips(void **state) {
             for (int i = 0; i < W * H * back.channels; i++) {
                 const int p = i / back.channels, c = i % back.channels;
                 const int v = channels == 2 ? pixels[2 * p + (c == 3)] : pixels[i];
-                assert_pixel(&back, p % W, p / W, c, deep ? v : v >> 8);
+                assert_pixel(&back, p % W, p / W, c, deep ? v : (v + 128) / 257);
             }
             image_free(&back);
         }
@@ -163,18 +163,11 @@ static void other_formats_are_refused(void **state) {
             const char *why = "";
             size_t size;
             if (i == 4 && !f) continue;
-            assert_false(image_encode(extensions[i], &image, &bytes, &size, &why));
+            assert_false(image_encode(NULL, extensions[i], &image, &bytes, &size, &why));
             assert_null(bytes);
             assert_non_null(strstr(why, f ? "float" : "use .png"));
         }
     }
-    txm_image huge = view(pixels, 4, TXM_U16); /* refused before its pixels are looked at */
-    const char *why = "";
-    unsigned char *bytes;
-    size_t size;
-    huge.width = huge.height = 1 << 14;
-    assert_false(image_encode(".png", &huge, &bytes, &size, &why));
-    assert_non_null(strstr(why, "2^29"));
 }
 
 static void damaged_png(void **state) {

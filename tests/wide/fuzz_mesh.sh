@@ -66,19 +66,19 @@ end_header
 0.5 0.75 0 0 0.5 0 0.5
 END
 
-with="tools/files/*.c"
+with="tools/files/*.c" libraries="-lpng -lz -ljpeg -lm"
 runs=30000
 [ "$FULL" = 1 ] && runs=300000
 # shellcheck disable=SC2086 # flags are words, files a pattern
 check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. -Itools \
-    tests/wide/fuzz/fuzz_mesh_decode.c $with -o "$OUT/fuzz_mesh" -lm &&
+    tests/wide/fuzz/fuzz_mesh_decode.c $with -o "$OUT/fuzz_mesh" $libraries &&
     check "$runs mutated meshes" "$OUT/fuzz_mesh" $runs "$tmp"/seeds/*
 
 # shellcheck disable=SC2086
 if [ "$FULL" = 1 ] && has clang; then
     check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \
         -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined -I. -Itools \
-        tests/wide/fuzz/fuzz_mesh_decode.c $with -o "$OUT/fuzz_mesh_libfuzzer" -lm &&
+        tests/wide/fuzz/fuzz_mesh_decode.c $with -o "$OUT/fuzz_mesh_libfuzzer" $libraries &&
         check "300,000 runs of libFuzzer" "$OUT/fuzz_mesh_libfuzzer" -runs=300000 -seed=1 \
             -max_len=4096 -timeout=20 -rss_limit_mb=2000 -verbosity=0 \
             -artifact_prefix="$OUT/" "$tmp/seeds"

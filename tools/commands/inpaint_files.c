@@ -81,7 +81,7 @@ void inpaint_show(void *user, const char *name, const txm_image *picture) {
     if (snprintf(j->shown[n].path, MAX_PATH, "%s/%02lu-%s.png", j->debug, (unsigned long)n + 1,
                  name) >= MAX_PATH)
         j->show_status = cli_fail(&j->run, CLI_USAGE, "'%s': the path is too long", j->debug);
-    else if (!image_encode(".png", picture, &j->shown[n].bytes, &j->shown[n].size, &why))
+    else if (!image_encode(NULL, ".png", picture, &j->shown[n].bytes, &j->shown[n].size, &why))
         j->show_status = cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->shown[n].path, why);
     else j->shown_count++;
 }

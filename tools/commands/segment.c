@@ -51,12 +51,16 @@ static void describe_labels(const txm_image *image, const txm_image *labels, int
 static int write_labels(cli *run, const txm_image *labels, int is_indexed,
                         const unsigned char palette[COLOURS][3]) {
     unsigned char *bytes = NULL;
+    image_job job = {0};
     const char *why;
     size_t size = 0;
     if (!is_indexed) return finish_with_picture(run, labels);
     cli_stage(run, "encode");
-    if (!image_encode_indexed(labels, palette, &bytes, &size, &why))
+    job.env = &run->env;
+    if (!image_encode_indexed(&job, labels, palette, &bytes, &size, &why)) {
+        if (job.is_cancelled) return check_result(run, TXM_CANCELLED, run->output);
         return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
+    }
     cli_figure(run, "file_bytes", (double)size);
     const int status = cli_finish(run, bytes, size);
     free(bytes);

@@ -1,9 +1,12 @@
-/* image_io.h - image files in and out, through stb_image and stb_image_write
+/* image_io.h - image files in and out
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Reads PNG, JPEG, BMP, TGA and binary PNM with 1, 3 or 4 channels; gray with alpha becomes RGBA,
-   16 bits become 8 unless a function says otherwise. Writes PNG, TGA, BMP and JPEG. Where a
-   function fails, *why is set to an English phrase that fits after "cannot read 'x.png': ".     */
+   Reads PNG, JPEG, BMP, TGA and PNM, and TIFF and WebP if their libraries were installed when this was
+   compiled, with 1, 3 or 4 channels; gray with alpha becomes RGBA, palettes RGB, colour keys alpha, CMYK
+   RGB, few bits 8, other than 8 bits 16 if that is wanted. Pictures that EXIF or TIFF says are turned or
+   mirrored are turned upright. Wrong checksums and missing pixels are errors. Writes PNG, TGA, BMP, JPEG,
+   TIFF and WebP. Where a function fails, *why is set to an English phrase that fits after "cannot read
+   'x.png': ".                                                                                    */
 #ifndef IMAGE_IO_H
 #define IMAGE_IO_H
 
@@ -56,13 +59,17 @@ void image_free(txm_image *image);
    Each may be 0: not known yet. */
 int image_can_write(const char *extension, int width, int height, int channels, const char **why);
 
-/* Encode for that extension into a block for free(). Samples are TXM_U8, for ".png" also TXM_U16,
-   which makes a PNG of 16 bits. 1 if all went well. */
-int image_encode(const char *extension, const txm_image *image, unsigned char **bytes, size_t *size,
-                 const char **why);
+/* Does the format of this extension take samples of 16 bits? */
+int image_takes_16_bits(const char *extension);
+
+/* Encode for that extension into a block for free(). Samples are TXM_U8, where image_takes_16_bits also
+   TXM_U16. JPEG has quality 95, the others lose nothing. Of the job, which may be NULL, only env is
+   used. 1 if all went well. */
+int image_encode(image_job *job, const char *extension, const txm_image *image, unsigned char **bytes,
+                 size_t *size, const char **why);
 
 /* A PNG of labels: one 8-bit channel whose values are indices into a palette of 256 RGB colours. */
-int image_encode_indexed(const txm_image *labels, const unsigned char palette[256][3],
+int image_encode_indexed(image_job *job, const txm_image *labels, const unsigned char palette[256][3],
                          unsigned char **bytes, size_t *size, const char **why);
 
 /* The same as image_encode, written to the path, whose extension says how. */

@@ -1,0 +1,271 @@
+/* image_png.c - PNG in and out, by libpng
+   SPDX-License-Identifier: MIT OR Unlicense */
+#include "image_formats.h"
+
+#include <png.h>
+#include <zlib.h>
+
+enum {
+    SIGNATURE = 8,
+    HEADER = 33,           /* bytes of the signature and the first chunk, which tells the size */
+    SRGB_GAMMA = 45455,    /* 1 / 2.2 in 1/100000, which stands for the curve of sRGB          */
+    GAMMA_TOLERANCE = 1500
+};
+
+int png_is(const unsigned char *bytes, size_t size) {
+    return size >= SIGNATURE && !memcmp(bytes, "\x89PNG\r\n\x1a\n", SIGNATURE);
+}
+
+/* PNG stores samples of 16 bits high byte first. */
+static int is_little_endian(void) {
+    const uint16_t one = 1;
+    unsigned char first;
+    memcpy(&first, &one, 1);
+    return first == 1;
+}
+
+/* ---- reading ------------------------------------------------------------------------------ */
+
+typedef struct reading {
+    image_source *s;
+    txm_image *image;
+    png_structp png;
+    png_infop info;
+    size_t at;
+    int has_odd_profile, has_bad_sum;
+} reading;
+
+static void take(png_structp png, png_bytep to, size_t size) {
+    reading *r = (reading *)png_get_io_ptr(png);
+    if (size > r->s->size - r->at) png_error(png, "cut short");
+    memcpy(to, r->s->bytes + r->at, size);
+    r->at += size;
+}
+
+static void go_home(png_structp png, png_const_charp text) {
+    (void)text;
+    png_longjmp(png, 1);
+}
+
+/* A profile that libpng does not take is none of sRGB, but for one that it knows to be badly made. The
+   sum over the pixels is checked when all of them are there. */
+static void listen(png_structp png, png_const_charp text) {
+    reading *r = (reading *)png_get_error_ptr(png);
+    if (!strncmp(text, "iCCP", 4) && !strstr(text, "sRGB")) r->has_odd_profile = 1;
+    if (!strncmp(text, "IDAT", 4) && strstr(text, "data check")) r->has_bad_sum = 1;
+}
+
+/* One line at most: the profile stands above all, then sRGB, then the gamma. */
+static void check_colours(reading *r) {
+    png_charp name;
+    png_bytep icc;
+    png_uint_32 size;
+    int kind;
+    png_fixed_point gamma;
+    if (r->has_odd_profile) {
+        image_warn(r->s, image_profile_warning);
+    } else if (png_get_iCCP(r->png, r->info, &name, &kind, &icc, &size)) {
+        if (strcmp(name, "sRGB") != 0) image_check_profile(r->s, icc, size);
+    } else if (!png_get_valid(r->png, r->info, PNG_INFO_sRGB) &&
+               png_get_gAMA_fixed(r->png, r->info, &gamma) &&
+               abs(gamma - SRGB_GAMMA) > GAMMA_TOLERANCE) {
+        image_warn(r->s, "its gamma is not that of sRGB; values are taken as they are, convert it if "
+                         "it looks wrong");
+    }
+}
+
+/* libpng finds room for few more than these chunks, so EXIF is read by it as well. */
+static void look_at_exif(reading *r) {
+    png_bytep exif;
+    png_uint_32 size;
+    if (png_get_eXIf_1(r->png, r->info, &size, &exif))
+        r->s->orientation = image_exif_orientation(exif, size);
+}
+
+/* Transparent colours and palettes become channels, few bits 8; gray with alpha RGBA, if it may. */
+static int read_head(reading *r) {
+    const image_job *job = r->s->job;
+    png_set_crc_action(r->png, PNG_CRC_ERROR_QUIT, PNG_CRC_ERROR_QUIT);
+    png_set_user_limits(r->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX); /* checked already */
+    png_set_read_fn(r->png, r, take);
+    png_read_info(r->png, r->info);
+    png_set_expand(r->png);
+    if (!job->deep) png_set_scale_16(r->png);
+    else if (is_little_endian()) png_set_swap(r->png);
+    if (job->channels == 0 && (png_get_color_type(r->png, r->info) == PNG_COLOR_TYPE_GRAY_ALPHA ||
+                               (png_get_color_type(r->png, r->info) == PNG_COLOR_TYPE_GRAY &&
+                                png_get_valid(r->png, r->info, PNG_INFO_tRNS))))
+        png_set_gray_to_rgb(r->png);
+    return 1;
+}
+
+static int read_rows(reading *r) {
+    const int passes = png_set_interlace_handling(r->png);
+    png_read_update_info(r->png, r->info);
+    const png_uint_32 height = png_get_image_height(r->png, r->info);
+    if (!image_begin(r->s, png_get_image_width(r->png, r->info), height,
+                     png_get_channels(r->png, r->info),
+                     png_get_bit_depth(r->png, r->info) == 16 ? TXM_U16 : TXM_U8, r->image))
+        return 0;
+    for (int pass = 0; pass < passes; pass++) {
+        for (int y = 0; y < r->image->height; y++) {
+            if (!image_continue(r->s->job, r->s->why, (size_t)pass * height + (size_t)y,
+                                (size_t)passes * height, "read"))
+                return 0;
+            png_read_row(r->png, (png_bytep)txm_image_row(r->image, y), NULL);
+        }
+    }
+    png_read_end(r->png, r->info);
+    return !r->has_bad_sum;
+}
+
+static int read_all(reading *r) {
+    if (setjmp(png_jmpbuf(r->png))) return 0;
+    return read_head(r) && read_rows(r);
+}
+
+static uint32_t number(const unsigned char *p) {
+    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+int png_read(image_source *s, txm_image *image) {
+    reading r = {s, image, NULL, NULL, 0, 0, 0};
+    *s->why = image_damaged; /* unless it is said better */
+    if (s->size < HEADER || memcmp(s->bytes + SIGNATURE + 4, "IHDR", 4) != 0) return 0;
+    if (!image_check_size(s, number(s->bytes + 16), number(s->bytes + 20))) return 0;
+    r.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &r, go_home, listen);
+    if (r.png) r.info = png_create_info_struct(r.png);
+    if (!r.info) *s->why = image_no_memory;
+    const int ok = r.info && read_all(&r);
+    if (ok) {
+        check_colours(&r);
+        look_at_exif(&r);
+    }
+    png_destroy_read_struct(&r.png, &r.info, NULL);
+    return ok;
+}
+
+/* ---- writing ------------------------------------------------------------------------------ */
+
+/* Ways to pack pixels. Photographs: what is left after prediction hardly repeats, so looking for
+   repetitions costs four times the time and gains nothing. Drawings and labels repeat a lot. */
+typedef struct packing {
+    int filters, strategy, level;
+} packing;
+
+static const packing packings[] = {
+    {PNG_ALL_FILTERS, Z_RLE, 1},
+    {PNG_ALL_FILTERS, Z_FILTERED, 6},
+    {PNG_FILTER_NONE, Z_DEFAULT_STRATEGY, 6},
+};
+
+enum {
+    PACKINGS = sizeof packings / sizeof *packings,
+    TRIAL_BANDS = 8,        /* of the picture, from top to bottom, that are tried            */
+    TRIAL_BYTES = 1 << 15,  /* of each: what deflate looks back on                           */
+    BETTER_PERCENT = 97     /* of the bytes: what a slower packing must reach                */
+};
+
+typedef struct writing {
+    image_target *t; /* where to; NULL: bytes are counted, no more */
+    image_job *job;
+    const char **why;
+    size_t size;
+    png_structp png;
+    png_infop info;
+} writing;
+
+static void give(png_structp png, png_bytep from, size_t size) {
+    writing *w = (writing *)png_get_io_ptr(png);
+    w->size += size;
+    if (w->t) image_put(w->t, from, size);
+}
+
+static void flush(png_structp png) {
+    (void)png;
+}
+
+static void ignore(png_structp png, png_const_charp text) {
+    (void)png;
+    (void)text;
+}
+
+static int write_all(writing *w, const txm_image *image, const unsigned char palette[256][3],
+                     const packing *p) {
+    static const int kinds[5] = {0, PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
+                                 PNG_COLOR_TYPE_RGB_ALPHA};
+    if (setjmp(png_jmpbuf(w->png))) return 0;
+    png_set_write_fn(w->png, w, give, flush);
+    png_set_user_limits(w->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+    png_set_IHDR(w->png, w->info, (png_uint_32)image->width, (png_uint_32)image->height,
+                 image->sample == TXM_U16 ? 16 : 8, palette ? PNG_COLOR_TYPE_PALETTE : kinds[image->channels],
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    if (palette) {
+        png_color colours[256];
+        for (int i = 0; i < 256; i++) {
+            colours[i].red = palette[i][0];
+            colours[i].green = palette[i][1];
+            colours[i].blue = palette[i][2];
+        }
+        png_set_PLTE(w->png, w->info, colours, 256);
+    }
+    png_set_filter(w->png, PNG_FILTER_TYPE_BASE, p->filters);
+    png_set_compression_strategy(w->png, p->strategy);
+    png_set_compression_level(w->png, p->level);
+    png_write_info(w->png, w->info);
+    if (image->sample == TXM_U16 && is_little_endian()) png_set_swap(w->png);
+    for (int y = 0; y < image->height; y++) {
+        if (!image_continue(w->job, w->why, (size_t)y, (size_t)image->height, "encode")) return 0;
+        png_write_row(w->png, (png_const_bytep)txm_image_row_const(image, y));
+    }
+    png_write_end(w->png, w->info);
+    return 1;
+}
+
+/* The size of the picture in that packing, if all went well. */
+static int write_packed(writing *w, const txm_image *image, const unsigned char palette[256][3],
+                        const packing *p) {
+    w->size = 0;
+    w->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, w, go_home, ignore);
+    w->info = w->png ? png_create_info_struct(w->png) : NULL;
+    const int ok = w->info && write_all(w, image, palette, p);
+    png_destroy_write_struct(&w->png, &w->info);
+    return ok;
+}
+
+/* The packing that makes bands of the picture smallest, or all of it if it is not large; NULL if that
+   failed. */
+static const packing *choose(writing *w, const txm_image *image, const unsigned char palette[256][3]) {
+    size_t best = 0;
+    const packing *chosen = &packings[0];
+    const size_t row = (size_t)image->width * (size_t)image->channels * txm_sample_bytes(image->sample);
+    const int tall = row < TRIAL_BYTES ? (int)(TRIAL_BYTES / row) : 1;
+    const int whole = image->height / TRIAL_BANDS <= tall;
+    for (int i = 0; i < PACKINGS; i++) {
+        size_t size = 0;
+        for (int b = 0; b < (whole ? 1 : TRIAL_BANDS); b++) {
+            txm_image band = *image;
+            if (!whole) {
+                band.height = tall;
+                band.pixels = txm_image_row(image, (image->height - tall) / (TRIAL_BANDS - 1) * b);
+            }
+            if (!write_packed(w, &band, palette, &packings[i])) return NULL;
+            size += w->size;
+        }
+        if (i == 0 || size < best / 100 * BETTER_PERCENT) {
+            best = size;
+            chosen = &packings[i];
+        }
+    }
+    return chosen;
+}
+
+int png_write(image_target *t, const txm_image *image, const unsigned char palette[256][3]) {
+    image_job silent = {0};
+    writing w = {NULL, &silent, t->why, 0, NULL, NULL};
+    *t->why = image_no_memory; /* unless it is said better */
+    const packing *p = choose(&w, image, palette);
+    w.t = t;
+    w.job = t->job;
+    return p && write_packed(&w, image, palette, p);
+}
