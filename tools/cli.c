@@ -145,6 +145,25 @@ static int add_input(cli *run, int *count, const char *argument) {
     return CLI_DONE;
 }
 
+/* -o - or, to choose the format, -o png:-: give the output a name with that extension. */
+static int take_stream(cli *run) {
+    const char *format = run->manual->stream ? run->manual->stream + 1 : "png";
+    const size_t n = strspn(run->output, "abcdefghijklmnopqrstuvwxyz");
+    int length = (int)strlen(format);
+    if (strcmp(run->output + n, n ? ":-" : "-") != 0 || n > 5) return CLI_DONE;
+    if (run->manual->makes_folder)
+        return cli_fail(run, CLI_USAGE, "-o %s: several files are written; name a folder for them",
+                        run->output);
+    if (n) {
+        format = run->output;
+        length = (int)n;
+    }
+    snprintf(run->stream_name, sizeof run->stream_name, "-.%.*s", length, format);
+    run->output = run->stream_name;
+    run->to_stdout = 1;
+    return CLI_DONE;
+}
+
 int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int argc, char **argv,
               int *status) {
     int help = 0, version = 0, count = 0, only_inputs = 0;
@@ -195,19 +214,22 @@ int cli_begin(cli *run, const cli_manual *manual, const cli_option *options, int
         if (*status != CLI_DONE) return 1;
     }
 
+    run->no_bar = run->quiet;
     if (help || version) {
         if (help) print_manual(manual, options, common);
         else printf("texkit %s\n", cli_versions);
         *status = fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
         return 1;
     }
+    cli_stop_by_signals(run);
     if (count < manual->inputs && manual->input) {
         *status = cli_fail(run, CLI_USAGE, "no %s given; see 'texkit %s --help'", manual->input,
                            manual->name);
     } else if (!run->output) {
         *status = cli_fail(run, CLI_USAGE, "no output given; add -o PATH");
     } else {
-        *status = cli_announce(run, options, common);
+        *status = take_stream(run);
+        if (*status == CLI_DONE) *status = cli_announce(run, options, common);
     }
     if (*status != CLI_DONE) return 1;
     cli_make_env(run);

@@ -30,7 +30,7 @@ typedef enum cli_kind {
     CLI_SEED,   /* uint64_t *                                                  */
     CLI_EXTENT, /* int[2], width and height, written WxH, min..max each        */
     CLI_INPUT,  /* const char **, a file that is read                          */
-    CLI_INPUTS, /* the same, several of them with commas between               */
+    CLI_INPUTS, /* the same, several of them with commas between, see cli_take_name */
     CLI_GROUPS, /* the same, semicolons between such lists                     */
     CLI_TILES,  /* const char **, a folder of 'texkit tiles' that is read      */
     CLI_OUTPUT, /* const char **, a file that is written                       */
@@ -57,6 +57,7 @@ typedef struct cli_manual {
     const char *input;   /* what the first is called in messages; NULL: they may be left out */
     int makes_folder;    /* the output is a folder of files                 */
     const char *smaller; /* what to do if memory runs out                   */
+    const char *stream;  /* the extension of what -o - writes; NULL: .png   */
 } cli_manual;
 
 /* ---- one run of one command --------------------------------------------------------------- */
@@ -66,16 +67,18 @@ typedef struct cli {
 
     /* from the command line */
     const char *inputs[4];
-    const char *output;
+    const char *output; /* for -o - and -o png:- a name such as "-.png" */
+    int to_stdout;
     const char *stats; /* NULL: none wanted */
     uint64_t seed;
-    int threads, quiet;
+    int threads, quiet, no_bar;
 
     int max_side; /* pixels: longer pictures are refused unread; 0: the readers' own limit. A
                      command sets it before it reads */
     txm_env env; /* for the calls into the library */
 
     /* the rest belongs to cli.c, progress.c and stats.c */
+    char stream_name[16];
     double started, stage_started, shown;
     struct {
         const char *name;
@@ -127,7 +130,10 @@ double cli_seconds(const cli *run);
    No input may be written over, and no two outputs may be the same file, through whatever links.
    So every file is announced before any work. cli_begin does this for the inputs, -o, --stats and
    the options of kinds CLI_INPUT to CLI_OUTPUT; a command does it for the names that it derives
-   from these. cli_finish and its like accept only outputs that were announced.                 */
+   from these. cli_finish and its like accept only outputs that were announced.
+
+   As an input, "-" is standard input, for one file of a run (file_read knows it); as -o or --stats,
+   standard output. What commands print on it is then discarded.                                */
 
 /* This file will be read. An exit status. */
 int cli_reads(cli *run, const char *path);
@@ -138,8 +144,9 @@ int cli_writes(cli *run, const char *path);
 /* The same for a file in the output folder, which need not exist yet. */
 int cli_writes_inside(cli *run, const char *name);
 
-/* Copy the first name of a list and move *list to the next one, or to NULL after the last. 0: the
-   name is empty or too long. */
+/* Copy the first name of a list and move *list to the next one, or to NULL after the last; a separator
+   stands before *list then. One behind a backslash belongs to the name, and so does one between parts
+   that together, but not alone, name a file. 0: the name is empty or too long. (names.c) */
 int cli_take_name(const char **list, const char *separators, char name[CLI_MAX_PATH]);
 
 /* Write the output and the statistics, both or neither; returns the exit status. */
@@ -165,15 +172,28 @@ int cli_makes_folder(cli *run, const char *path, int *made);
 /* Remove an empty folder. */
 void cli_removes_folder(const char *path);
 
-/* ---- between cli.c, progress.c, stats.c and outputs.c --------------------------------------- */
+/* Has this very path been announced as an output? */
+int cli_is_output(const char *path);
+
+/* ---- between cli.c, progress.c, stats.c, stop.c and outputs.c -------------------------------- */
 
 /* Announce the files that the command line names. */
 int cli_announce(cli *run, const cli_option *own, const cli_option *common);
 
-/* The environment of the library's calls: memory, threads, the progress bar, cancelling by Ctrl-C. */
+/* From here on SIGINT, SIGTERM and SIGHUP end the program with a message and status 1, within
+   milliseconds, after cli_remove_unfinished; but while they are on hold, only when they are released. */
+void cli_stop_by_signals(const cli *run);
+void cli_stop_hold(void);
+void cli_stop_release(void);
+
+/* Remove what an output is not yet: temporary files, a new folder. Signal handlers may call it. */
+void cli_remove_unfinished(void);
+
+/* The environment of the library's calls: memory, threads, the progress bar. */
 void cli_make_env(cli *run);
 
 /* Remove the progress bar, if there is one. */
+enum { CLI_BAR_COLUMNS = 60 };
 void cli_clear_bar(cli *run);
 
 /* Seconds on a clock that never goes back. */

@@ -186,8 +186,14 @@ int finish_with_picture(cli *run, const txm_image *image) {
     return status;
 }
 
+static int fail_stream(cli *run, const char *what) {
+    return cli_fail(run, CLI_USAGE, "standard output holds one file; name an OUT, for its name is "
+                    "needed for that of '%s'", what);
+}
+
 int path_beside(cli *run, const char *ending, char path[MAX_PATH]) {
     char extension[8];
+    if (run->to_stdout) return fail_stream(run, ending);
     file_extension(run->output, extension);
     const size_t n = strlen(run->output) - strlen(extension);
     if (n + strlen(ending) >= MAX_PATH)
@@ -228,6 +234,7 @@ static size_t own_name(const char *path, const char *exemplar, const char **name
 int path_of_map(cli *run, const char *map, const char *picture, const char *ending,
                 char path[MAX_PATH]) {
     char extension[8];
+    if (run->to_stdout && (map || *ending)) return fail_stream(run, map ? map : ending);
     file_extension(run->output, extension);
     const size_t n = strlen(run->output) - strlen(extension);
     const char *name = "";

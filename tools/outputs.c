@@ -1,84 +1,73 @@
 /* outputs.c - the files of a run: announced before any work, written all or none; see cli.h
    SPDX-License-Identifier: MIT OR Unlicense */
-#define _XOPEN_SOURCE 700 /* POSIX: realpath, S_ISBLK */
+#define _XOPEN_SOURCE 700 /* POSIX: openat, linkat */
 #include "cli.h"
+#include "place.h"
 
 #include <assert.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <stdio.h>
-#include <sys/stat.h>
+#include <sys/file.h>
+#include <time.h>
 #include <unistd.h>
 
-/* ---- the files of a run ------------------------------------------------------------------- */
+/* ---- announcing --------------------------------------------------------------------------- */
 
-/* An output: written to a temporary file in its folder, then renamed. */
-typedef struct output {
-    const char *path;
-    const void *bytes;
-    size_t size;
-    char place[PATH_MAX];      /* where it goes: the path, symbolic links followed */
-    char temporary[PATH_MAX + 24];
-    int is_device;             /* /dev/null, a pipe: written in place              */
-} output;
+static int is_stream(const char *path) {
+    return !strcmp(path, "-");
+}
 
-static int find_place(output *o) {
-    struct stat info;
-    if (!realpath(o->path, o->place)) {
-        if (errno != ENOENT || strlen(o->path) >= sizeof o->place) return 0;
-        memcpy(o->place, o->path, strlen(o->path) + 1);
-    } else if (stat(o->place, &info) == 0) {
-        if (S_ISDIR(info.st_mode)) {
-            errno = EISDIR;
-            return 0;
-        }
-        o->is_device = !S_ISREG(info.st_mode);
-    }
-    snprintf(o->temporary, sizeof o->temporary, "%s.%ld.tmp", o->place, (long)getpid());
-    return 1;
+static int cannot_write(cli *run, const char *path, const char *why) {
+    return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", path, why);
+}
+
+/* Why no file can be made there; errno is of place_find. */
+static int cannot_find(cli *run, const char *path) {
+    const int is_folder = errno == ENOENT || errno == EACCES || errno == ENOTDIR;
+    return cli_fail(run, CLI_FAILED, "cannot write '%s': %s%s", path, strerror(errno),
+                    is_folder ? "; choose a folder that exists and that you may write to" : "");
 }
 
 /* Can this path be written at all? */
 static int check_output(cli *run, const char *path) {
-    output o = {0};
-    char folder[PATH_MAX] = ".";
-    o.path = path;
-    if (!find_place(&o))
-        return cli_fail(run, CLI_FAILED, "cannot write '%s': %s", path, strerror(errno));
-    if (o.is_device) return CLI_DONE;
-    const char *slash = strrchr(o.place, '/');
-    if (slash) snprintf(folder, sizeof folder, "%.*s/", (int)(slash - o.place), o.place);
-    if (access(folder, W_OK | X_OK) == 0) return CLI_DONE;
-    return cli_fail(run, CLI_FAILED,
-                    "cannot write '%s': %s; choose a folder that exists and that you may write to",
-                    path, strerror(errno));
+    place p;
+    if (is_stream(path)) return CLI_DONE;
+    if (!place_find(path, &p)) return cannot_find(run, path);
+    cli_stop_hold(); /* it makes a file and removes it */
+    const char *why = p.is_device && access(path, W_OK) != 0 ? strerror(errno) : place_refusal(&p);
+    cli_stop_release();
+    place_close(&p);
+    return why ? cannot_write(run, path, why) : CLI_DONE;
 }
 
 int cli_checks_folder(cli *run, const char *path) {
     struct stat info;
-    char place[PATH_MAX + 2];
+    char name[CLI_MAX_PATH];
+    const char *why = NULL;
+    place p;
     size_t n = strlen(path);
-    if (stat(path, &info) == 0) {
-        if (!S_ISDIR(info.st_mode)) errno = ENOTDIR;
-        else if (access(path, W_OK | X_OK) == 0) return CLI_DONE;
-        return cli_fail(run, CLI_FAILED, "cannot write into '%s': %s; name another folder", path,
-                        strerror(errno));
+    if (stat(path, &info) != 0 && lstat(path, &info) != 0) { /* there is no such folder yet */
+        if (n >= sizeof name) return cannot_write(run, path, strerror(ENAMETOOLONG));
+        memcpy(name, path, n + 1);
+        while (n > 1 && name[n - 1] == '/') name[--n] = 0; /* else "new/" is in "new" */
+        return check_output(run, name);
     }
-    if (n > PATH_MAX) return cli_fail(run, CLI_FAILED, "the path is too long");
-    memcpy(place, path, n + 1);
-    while (n > 1 && place[n - 1] == '/') place[--n] = 0; /* else "new/" is in "new" */
-    return check_output(run, place);
+    if (!place_in_folder(path, &p)) why = strerror(errno);
+    cli_stop_hold();
+    if (!why) why = place_refusal(&p);
+    cli_stop_release();
+    place_close(&p);
+    if (!why) return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "cannot write into '%s': %s; name another folder", path, why);
 }
 
-/* An announced file. Paths lead to the same file if device, inode and name are equal. */
+/* An announced file. */
 typedef struct announced {
     char *path;
     int is_output;
-    int is_file;      /* exists or will; not a pipe or folder, which writing cannot destroy  */
-    dev_t device;
-    ino_t inode;      /* of the file if it exists, else of the folder that it will be in     */
-    const char *name; /* in that folder; empty if the file exists                            */
+    int is_file; /* exists or will; not a pipe or folder, which writing cannot destroy */
+    place place; /* closed */
 } announced;
 
 /* A program runs one command: the list lasts until it exits. */
@@ -86,28 +75,24 @@ static announced *known;
 static size_t known_count;
 
 static void identify(announced *a) {
-    struct stat info;
-    a->name = "";
-    if (stat(a->path, &info) == 0) {
-        a->is_file = S_ISREG(info.st_mode) || S_ISBLK(info.st_mode);
+    place *p = &a->place;
+    if (is_stream(a->path)) {
+        p->folder = -1;
+        a->is_file = fstat(a->is_output ? STDOUT_FILENO : STDIN_FILENO, &p->info) == 0 &&
+                     S_ISREG(p->info.st_mode);
+        p->exists = 1;
     } else {
-        char folder[PATH_MAX] = ".";
-        const char *slash = strrchr(a->path, '/');
-        if (slash) snprintf(folder, sizeof folder, "%.*s/", (int)(slash - a->path), a->path);
-        if (stat(folder, &info) != 0) return;
-        a->name = slash ? slash + 1 : a->path;
-        a->is_file = 1;
+        a->is_file = place_find(a->path, p) && (!p->is_device || S_ISBLK(p->info.st_mode));
+        place_close(p);
     }
-    a->device = info.st_dev;
-    a->inode = info.st_ino;
 }
 
 static int is_same_file(const announced *a, const announced *b) {
-    return a->is_file && b->is_file && a->device == b->device && a->inode == b->inode &&
-           !strcmp(a->name, b->name);
+    if (is_stream(a->path) && is_stream(b->path)) return a->is_output == b->is_output;
+    return a->is_file && b->is_file && place_is_same(&a->place, &b->place);
 }
 
-static int is_output(const char *path) {
+int cli_is_output(const char *path) {
     for (size_t i = 0; i < known_count; i++)
         if (known[i].is_output && !strcmp(known[i].path, path)) return 1;
     return 0;
@@ -126,15 +111,34 @@ static int announce(cli *run, const char *path, int is_output) {
     a->is_output = is_output;
     identify(a);
     for (const announced *b = known; b < a; b++) {
-        if (!(a->is_output || b->is_output) || !is_same_file(a, b)) continue;
+        if (!is_same_file(a, b)) continue;
         if (a->is_output && b->is_output)
             return cli_fail(run, CLI_USAGE, "'%s' and '%s' are the same file and would be written "
                             "twice; give them different names", b->path, path);
-        return cli_fail(run, CLI_USAGE, "writing '%s' would destroy '%s', which is read; give the "
-                        "output another name", is_output ? path : b->path,
-                        is_output ? b->path : path);
+        if (a->is_output || b->is_output)
+            return cli_fail(run, CLI_USAGE, "writing '%s' would destroy '%s', which is read; give the "
+                            "output another name", is_output ? path : b->path,
+                            is_output ? b->path : path);
+        if (is_stream(path))
+            return cli_fail(run, CLI_USAGE, "'-', standard input, holds one file; name the others");
     }
     return CLI_DONE;
+}
+
+/* Where results go that are written to standard output; -1: there are none. */
+static int data = -1;
+
+static int take_stdout(cli *run, const char *output) {
+    static const char *const texts[] = {".obj", ".svg", ".json", ".txt", ".ply", ""};
+    const char *extension = strrchr(output, '.');
+    int is_text = 0;
+    for (int i = 0; texts[i][0]; i++) is_text |= extension && !strcmp(extension, texts[i]);
+    if (isatty(STDOUT_FILENO) && !is_text && strcmp(output, "-") != 0)
+        return cli_fail(run, CLI_USAGE, "standard output is a terminal; redirect it, or name an OUT");
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    data = dup(STDOUT_FILENO);
+    if (data >= 0 && nowhere >= 0 && dup2(nowhere, STDOUT_FILENO) >= 0) return CLI_DONE;
+    return cannot_write(run, "-", strerror(errno));
 }
 
 int cli_reads(cli *run, const char *path) {
@@ -158,16 +162,6 @@ int cli_writes_inside(cli *run, const char *name) {
     if (!status) status = announce(run, path, 1);
     if (!status && access(run->output, F_OK) == 0) status = check_output(run, path);
     return status;
-}
-
-int cli_take_name(const char **list, const char *separators, char name[CLI_MAX_PATH]) {
-    const size_t length = strcspn(*list, separators);
-    const char *from = *list;
-    *list = from[length] ? from + length + 1 : NULL;
-    if (length == 0 || length >= CLI_MAX_PATH) return 0;
-    memcpy(name, from, length);
-    name[length] = 0;
-    return 1;
 }
 
 /* Announce the files that the value of an option names. */
@@ -204,61 +198,168 @@ int cli_announce(cli *run, const cli_option *own, const cli_option *common) {
     int status = CLI_DONE;
     for (int i = 0; i < run->manual->inputs && run->inputs[i] && !status; i++)
         status = cli_reads(run, run->inputs[i]);
-    if (!status)
-        status = run->manual->makes_folder ? cli_checks_folder(run, run->output)
-                                           : cli_writes(run, run->output);
+    if (!status && run->manual->makes_folder) status = cli_checks_folder(run, run->output);
+    else if (!status) status = cli_writes(run, run->to_stdout ? "-" : run->output);
     if (!status) status = announce_options(run, own);
-    return status ? status : announce_options(run, common);
+    if (!status) status = announce_options(run, common);
+    if (!status && run->to_stdout) status = take_stdout(run, run->output);
+    else if (!status && run->stats && is_stream(run->stats)) status = take_stdout(run, "-");
+    return status;
 }
 
 /* ---- writing ---------------------------------------------------------------------------- */
 
-static int write_all(const char *path, const output *o, int flags) {
-    int file = open(path, flags, 0666);
-    size_t done = 0;
-    if (file < 0) return 0;
-    while (done < o->size) {
-        ssize_t n = write(file, (const char *)o->bytes + done, o->size - done);
+typedef struct output {
+    const char *path;
+    const void *bytes;
+    size_t size;
+    int is_stdout;
+    place place;
+    char temporary[PLACE_TEMPORARY]; /* the name of a file in that folder, or empty */
+    char old[PLACE_TEMPORARY];       /* the same: what is replaced, by another name */
+} output;
+
+/* What must go if the program ends now. */
+static output *unfinished;
+static int unfinished_count;
+static char new_folder[CLI_MAX_PATH];
+
+void cli_remove_unfinished(void) {
+    for (int i = 0; i < unfinished_count; i++) {
+        const output *o = &unfinished[i];
+        if (o->temporary[0]) unlinkat(o->place.folder, o->temporary, 0);
+    }
+    if (new_folder[0]) rmdir(new_folder);
+}
+
+static int write_bytes(int file, const output *o) {
+    for (size_t done = 0; done < o->size;) {
+        const ssize_t n = write(file, (const char *)o->bytes + done, o->size - done);
         if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) break;
+        if (n == 0) errno = EIO;
+        if (n <= 0) return 0;
         done += (size_t)n;
     }
-    int error = done < o->size ? errno : 0;
+    return 1;
+}
+
+static int write_and_close(int file, const output *o, int keep_mode) {
+    if (file < 0) return 0;
+    int error = write_bytes(file, o) && (!keep_mode || place_keep_mode(&o->place, file)) ? 0 : errno;
     if (close(file) != 0 && !error) error = errno;
     errno = error;
     return error == 0;
 }
 
+static int write_temporary(output *o) {
+    cli_stop_hold();
+    const int file = place_create(&o->place, o->temporary);
+    if (file < 0) o->temporary[0] = 0;
+    cli_stop_release();
+    return write_and_close(file, o, 1);
+}
+
+/* What cannot be taken back is written first: if it fails, nothing else has changed. */
+static int write_device(const output *o) {
+    if (o->is_stdout) return write_and_close(data, o, 0);
+    return write_and_close(open(o->path, O_WRONLY | O_CLOEXEC), o, 0);
+}
+
+/* Two runs that write the same set of files take turns, as far as the system allows: the set is then
+   that of one of them. Not for long, for a stranger may hold this lock. */
+static int lock_folder(const output *o) {
+    enum { TRIES = 100 };
+    const struct timespec pause = {0, 10000000}; /* 10 ms */
+    const int file = openat(o->place.folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    for (int i = 0; i < TRIES && file >= 0 && flock(file, LOCK_EX | LOCK_NB) != 0; i++)
+        if (errno != EWOULDBLOCK || nanosleep(&pause, NULL) != 0) break;
+    return file;
+}
+
+/* Give the file that will be replaced a second name, from which it can be restored. Without it, as on
+   systems without hard links, the rest is done all the same. */
+static void keep_old(output *o) {
+    for (unsigned i = 0; i < 100 && o->place.exists; i++) {
+        snprintf(o->old, sizeof o->old, ".texkit-old%08x", (unsigned)getpid() * 100 + i);
+        if (linkat(o->place.folder, o->place.name, o->place.folder, o->old, 0) == 0) return;
+        if (errno != EEXIST) break;
+    }
+    o->old[0] = 0;
+}
+
+static void restore(output *o) {
+    const int folder = o->place.folder;
+    if (o->old[0]) renameat(folder, o->old, folder, o->place.name);
+    else if (!o->place.exists) unlinkat(folder, o->place.name, 0);
+    o->old[0] = 0;
+}
+
+/* Rename the temporary files, all or none; returns the index of one that failed, or count. */
+static int rename_all(output *outputs, int count) {
+    int error = 0, failed = count, done = count;
+    const int lock = count > 1 && outputs[0].temporary[0] ? lock_folder(&outputs[0]) : -1;
+    for (int k = count - 1; k >= 0 && failed == count; k--) {
+        output *o = &outputs[k];
+        if (!o->temporary[0]) continue;
+        if (count > 1) keep_old(o);
+        if (renameat(o->place.folder, o->temporary, o->place.folder, o->place.name) != 0) {
+            error = errno;
+            failed = k;
+        } else {
+            o->temporary[0] = 0;
+            done = k;
+        }
+    }
+    for (int k = done; k < count && failed < count; k++)
+        if (!outputs[k].place.is_device && !outputs[k].is_stdout) restore(&outputs[k]);
+    for (int k = 0; k < count; k++)
+        if (outputs[k].old[0]) unlinkat(outputs[k].place.folder, outputs[k].old, 0);
+    if (lock >= 0) close(lock);
+    errno = error;
+    return failed;
+}
+
+/* Write all outputs, or none: returns the index of one that failed, with errno set, or count. */
+static int write_outputs(output *outputs, int count) {
+    for (int i = 0; i < count; i++) {
+        output *o = &outputs[i];
+        if (!o->is_stdout && !place_find(o->path, &o->place)) return i;
+        if (!o->is_stdout && !o->place.is_device && !write_temporary(o)) return i;
+    }
+    for (int i = 0; i < count; i++)
+        if ((outputs[i].is_stdout || outputs[i].place.is_device) && !write_device(&outputs[i])) return i;
+    cli_stop_hold();
+    const int failed = rename_all(outputs, count);
+    if (failed < count) cli_stop_release(); /* else it is too late to stop */
+    return failed;
+}
+
 /* Write all outputs and the statistics, or none. outputs must have room for one more. */
 static int finish(cli *run, output *outputs, int count) {
     char text[4096];
-    int i, written = 0, status = CLI_DONE;
-    for (i = 0; i < count; i++) assert(is_output(outputs[i].path));
     const size_t size = cli_end(run, text, sizeof text);
     if (run->stats) {
         outputs[count].path = run->stats;
         outputs[count].bytes = text;
         outputs[count++].size = size;
     }
-
-    for (i = 0; i < count; i++) {
-        output *o = &outputs[i];
-        if (!find_place(o)) break;
-        if (o->is_device) continue;
-        written = i + 1;
-        if (!write_all(o->temporary, o, O_WRONLY | O_CREAT | O_EXCL)) break;
+    for (int i = 0; i < count; i++) {
+        outputs[i].place.folder = -1;
+        outputs[i].is_stdout = is_stream(outputs[i].path) ||
+                               (run->to_stdout && !strcmp(outputs[i].path, run->output));
+        assert(outputs[i].is_stdout || cli_is_output(outputs[i].path));
     }
-    for (int k = count - 1; i == count && k >= 0; k--) {
-        output *o = &outputs[k];
-        if (o->is_device ? !write_all(o->place, o, O_WRONLY) : rename(o->temporary, o->place) != 0)
-            i = k;
-    }
-    if (i < count) {
-        status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", outputs[i].path,
-                          strerror(errno));
-        for (int k = 0; k < written; k++) unlink(outputs[k].temporary);
-    }
-    return status;
+    unfinished = outputs;
+    unfinished_count = count;
+    const int failed = write_outputs(outputs, count);
+    const char *why = failed < count ? strerror(errno) : NULL;
+    cli_stop_hold();
+    if (why) cli_remove_unfinished();
+    unfinished_count = 0;
+    new_folder[0] = 0;
+    if (why) cli_stop_release();
+    for (int i = 0; i < count; i++) place_close(&outputs[i].place);
+    return why ? cannot_write(run, outputs[failed].path, why) : CLI_DONE;
 }
 
 int cli_finish(cli *run, const void *bytes, size_t size) {
@@ -283,9 +384,14 @@ int cli_finish_files(cli *run, const cli_file *files, int count) {
 }
 
 int cli_makes_folder(cli *run, const char *path, int *made) {
+    const size_t n = strlen(path);
+    cli_stop_hold();
     *made = mkdir(path, 0777) == 0;
-    if (*made || errno == EEXIST) return CLI_DONE;
-    return cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", path, strerror(errno));
+    const int error = *made || errno == EEXIST ? 0 : errno;
+    if (*made && n < sizeof new_folder) memcpy(new_folder, path, n + 1);
+    cli_stop_release();
+    if (!error) return CLI_DONE;
+    return cli_fail(run, CLI_FAILED, "cannot make the folder '%s': %s", path, strerror(error));
 }
 
 void cli_removes_folder(const char *path) {

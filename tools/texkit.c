@@ -38,25 +38,45 @@ static int print_overview(void) {
     printf("texkit COMMAND [INPUT...] [options]\n\nCommands:\n");
     for (int i = 0; i < COMMAND_COUNT; i++)
         printf("  %-10s %s\n", commands[i]->manual->name, commands[i]->manual->summary);
-    printf("\n'texkit COMMAND --help' shows the options of one. Exit status: 0 done, 1 the work\n"
-           "failed, 2 the command line was wrong.\n\nExample:\n%s", synth_command.manual->example);
+    printf("\n'texkit help COMMAND', or 'texkit COMMAND --help', shows the options of one; 'texkit version'\n"
+           "the versions of tool and headers. As a picture, model or mesh, - is standard input; -o - is\n"
+           "standard output, -o jpg:- in that format; --stats - goes there too. A comma in a file's name is\n"
+           "written \\, in lists. Ctrl-C ends the work and leaves no file behind. Exit status: 0 done, 1 the\n"
+           "work failed or was stopped, 2 the command line was wrong.\n\nExample:\n%s",
+           synth_command.manual->example);
     return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
+}
+
+static int print_versions(void) {
+    printf("texkit %s\n", cli_versions);
+    return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
+}
+
+static const command *find_command(const char *name) {
+    for (int i = 0; i < COMMAND_COUNT; i++)
+        if (!strcmp(name, commands[i]->manual->name)) return commands[i];
+    fprintf(stderr, "texkit: unknown command '%.60s'; see 'texkit help'\n", name);
+    return NULL;
+}
+
+/* "texkit help", "texkit help COMMAND" */
+static int help(int argc, char **argv) {
+    char option[] = "--help", *only[] = {option};
+    const command *c;
+    if (argc == 0) return print_overview();
+    if (argc > 1) {
+        fprintf(stderr, "texkit help: unexpected argument '%.60s'; name one command\n", argv[1]);
+        return CLI_USAGE;
+    }
+    c = find_command(argv[0]);
+    return c ? c->run(1, only) : CLI_USAGE;
 }
 
 int main(int argc, char **argv) {
     env_let_threads_sleep(argv);
-    if (argc < 2) {
-        fprintf(stderr, "texkit: no command given; see 'texkit --help'\n");
-        return CLI_USAGE;
-    }
-    if (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")) return print_overview();
-    if (!strcmp(argv[1], "--version")) {
-        printf("texkit %s\n", cli_versions);
-        return fflush(stdout) == 0 ? CLI_DONE : CLI_FAILED;
-    }
-    for (int i = 0; i < COMMAND_COUNT; i++) {
-        if (!strcmp(argv[1], commands[i]->manual->name)) return commands[i]->run(argc - 2, argv + 2);
-    }
-    fprintf(stderr, "texkit: unknown command '%.60s'; see 'texkit --help'\n", argv[1]);
-    return CLI_USAGE;
+    if (argc < 2 || !strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")) return print_overview();
+    if (!strcmp(argv[1], "--version") || !strcmp(argv[1], "version")) return print_versions();
+    if (!strcmp(argv[1], "help")) return help(argc - 2, argv + 2);
+    const command *c = find_command(argv[1]);
+    return c ? c->run(argc - 2, argv + 2) : CLI_USAGE;
 }

@@ -31,7 +31,7 @@ static const cli_manual learn_manual = {
     "statistics, no pixels; 'texkit synth' makes new texture from it.\n",
     "  texkit learn gravel.jpg -o gravel.txs\n"
     "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
-    1, "exemplar", 0, "take a smaller exemplar"};
+    1, "exemplar", 0, "take a smaller exemplar", ".txs"};
 
 static int run_learn(int argc, char **argv) {
     cli run;
@@ -106,7 +106,7 @@ static const cli_manual synth_manual = {
     "exemplar's, and it takes longer.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
-    1, "exemplar or model", 0, "take a smaller size"};
+    1, "exemplar or model", 0, "take a smaller size", NULL};
 
 /* The input as a model: loaded if it is one, else learned from the picture. */
 static int get_model(cli *run, texsyn_model **model) {

@@ -37,7 +37,7 @@ static const cli_manual composite_manual = {
     1,
     "exemplar or model",
     0,
-    "take a smaller size"};
+    "take a smaller size", NULL};
 
 typedef struct composite_job {
     cli run;

@@ -24,7 +24,7 @@ static const cli_manual edges_manual = {
     "on each side.\n",
     "  texkit edges bricks.jpg -o bricks-edges.png --levels 3 --smooth 1.5 --least 40\n"
     "  texkit edges bricks.jpg -o bricks.svg --layers bricks-layers.png\n",
-    1, "exemplar", 0, "take a smaller picture"};
+    1, "exemplar", 0, "take a smaller picture", NULL};
 
 typedef struct options {
     const char *smooth, *thresholds, *over, *layers;

@@ -19,7 +19,7 @@ static const cli_manual erode_manual = {
     "  of 'texkit learn', the polished stone is learned from a weathered one.\n",
     "  texkit erode stone.png --weathered wall.jpg --level 0.5 -o old.png --cracks cracks.png\n"
     "  texkit erode new.png --weathered wall.jpg --level 1 --levels foot.png -o old.png\n",
-    1, "picture", 0, "take a smaller picture"};
+    1, "picture", 0, "take a smaller picture", NULL};
 
 typedef struct erode_job {
     cli run;

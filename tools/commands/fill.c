@@ -26,7 +26,7 @@ static const cli_manual fill_manual = {
     1,
     "picture",
     0,
-    "take a smaller picture"};
+    "take a smaller picture", NULL};
 
 typedef struct fill_job {
     cli run;

@@ -33,7 +33,7 @@ static const cli_manual inpaint_manual = {
     "at the holes; 'joins', lines that were continued; 'missing' texels on the surface; 'written'.\n",
     "  texkit inpaint photo.jpg --mask wires.png -o clean.png\n"
     "  texkit inpaint --mesh cow.obj --texture cow.png --mask hole.png -o cow-whole.png\n",
-    1, NULL, 0, "take smaller pictures"};
+    1, NULL, 0, "take smaller pictures", NULL};
 
 /* ---- options -------------------------------------------------------------------------------- */
 
@@ -110,7 +110,7 @@ static int check_options(inpaint_job *j) {
     status = parse_number(&j->run, "--alpha", j->alpha, 1, 1e6, &alpha);
     if (!status) status = take_maps(j);
     if (!status) status = inpaint_name_outputs(j);
-    if (!status && j->debug) status = cli_checks_folder(&j->run, j->debug);
+    if (!status && j->debug) status = inpaint_announce_shown(j);
     d->alpha = (float)alpha;
     d->seed = j->run.seed;
     d->gutter = j->gutter < 0 ? 0 : j->gutter == 0 ? -1 : j->gutter;

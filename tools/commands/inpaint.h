@@ -54,6 +54,9 @@ int inpaint_read_lines(inpaint_job *j, const char *path);
 /* Name and announce the outputs: OUT and one for each map. */
 int inpaint_name_outputs(inpaint_job *j);
 
+/* Announce the files in the folder of --debug that may be written over. An exit status. */
+int inpaint_announce_shown(inpaint_job *j);
+
 /* Read mesh, pictures and masks, and make room for the outputs. */
 int inpaint_read_all(inpaint_job *j);
 

@@ -1,7 +1,9 @@
 /* inpaint_files.c - the files of 'texkit inpaint', in and out
    SPDX-License-Identifier: MIT OR Unlicense */
+#define _XOPEN_SOURCE 700 /* POSIX: opendir */
 #include "inpaint.h"
 
+#include <dirent.h>
 #include <stdio.h>
 
 /* ---- the outputs' names ----------------------------------------------------------------------- */
@@ -88,6 +90,21 @@ void inpaint_show(void *user, const char *name, const txm_image *picture) {
 
 /* ---- writing --------------------------------------------------------------------------------- */
 
+/* The pictures of --debug that are there may be written over: announce them. */
+int inpaint_announce_shown(inpaint_job *j) {
+    char path[MAX_PATH];
+    int status = cli_checks_folder(&j->run, j->debug);
+    DIR *folder = status ? NULL : opendir(j->debug);
+    for (const struct dirent *e; folder && !status && (e = readdir(folder));) {
+        const size_t digits = strspn(e->d_name, "0123456789");
+        if (digits < 2 || e->d_name[digits] != '-') continue;
+        if (snprintf(path, sizeof path, "%s/%s", j->debug, e->d_name) < MAX_PATH)
+            status = cli_writes(&j->run, path);
+    }
+    if (folder) closedir(folder);
+    return status;
+}
+
 /* Announce the pictures of --debug, whose names were not known before. */
 static int add_shown(inpaint_job *j, cli_file *files, int *is_new) {
     int status = cli_makes_folder(&j->run, j->debug, is_new);
@@ -95,7 +112,7 @@ static int add_shown(inpaint_job *j, cli_file *files, int *is_new) {
         files[i].name = j->shown[i].path;
         files[i].bytes = j->shown[i].bytes;
         files[i].size = j->shown[i].size;
-        status = cli_writes(&j->run, j->shown[i].path);
+        if (!cli_is_output(j->shown[i].path)) status = cli_writes(&j->run, j->shown[i].path);
     }
     return status;
 }

@@ -16,7 +16,7 @@ static const cli_manual knit_manual = {
     "16 bits.\n",
     "  texkit knit rock.png grass.png --layout slope.png -o hill.png\n"
     "  texkit knit a.png b.png --layout l.png --border ab.png --border-layout ab-l.png -o c.png\n",
-    2, "two pictures", 0, "take smaller pictures"};
+    2, "two pictures", 0, "take smaller pictures", NULL};
 
 enum { LONGEST_ZONE = 64, ROUGHEST = 32 };
 

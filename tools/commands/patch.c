@@ -44,7 +44,7 @@ static const cli_manual patch_manual = {
     "  texkit patch bricks.jpg -o wall.png --size 2048x1024 --tileable --lod 4\n"
     "  texkit patch bricks.png -o wall.png --size 512x512 --normal 1 --data 2 \\\n"
     "      --maps bricks-normal.png,bricks-height.png --weights 1,0,0.3\n",
-    1, "exemplar", 0, "take a smaller size"};
+    1, "exemplar", 0, "take a smaller size", NULL};
 
 /* ---- synthesis ----------------------------------------------------------------------------- */
 

@@ -47,9 +47,8 @@ typedef struct patch_job {
 
 /* ---- patch_options.c ---- */
 
-/* Split a list at its separators into at most so many names, none of them empty. */
-int patch_split(patch_job *j, const char *option, const char *list, char separator, int most,
-                names *n);
+/* Split a list at its commas into at most so many names, none of them empty. */
+int patch_split(patch_job *j, const char *option, const char *list, int most, names *n);
 
 /* Refuse, before any work, options that do not go together. */
 int patch_check_options(patch_job *j);

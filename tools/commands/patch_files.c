@@ -82,7 +82,7 @@ static int read_exemplar(patch_job *j, int e) {
 /* A list of masks or guides, one for each exemplar. */
 static int read_for_exemplars(patch_job *j, const char *option, const char *list, int channels) {
     names n = {0};
-    int status = patch_split(j, option, list, ',', TEXPATCH_MAX_EXEMPLARS, &n);
+    int status = patch_split(j, option, list, TEXPATCH_MAX_EXEMPLARS, &n);
     if (!status && n.count != j->desc.exemplar_count)
         status = cli_fail(&j->run, CLI_USAGE, "%s '%s': give %d, one for each exemplar", option,
                           list, j->desc.exemplar_count);
@@ -109,7 +109,7 @@ static int read_sized(patch_job *j, const char *what, const char *path, int chan
 static int read_kept(patch_job *j) {
     names n = {0};
     texpatch_desc *d = &j->desc;
-    int status = patch_split(j, "--keep", j->kept_list, ',', TEXPATCH_MAX_MAPS, &n);
+    int status = patch_split(j, "--keep", j->kept_list, TEXPATCH_MAX_MAPS, &n);
     if (!status && n.count != d->map_count)
         status = cli_fail(&j->run, CLI_USAGE, "--keep '%s': give %d, one for each map",
                           j->kept_list, d->map_count);

@@ -10,29 +10,33 @@ static const int64_t MAX_PLACE = (int64_t)1 << 40;
 
 /* ---- lists ------------------------------------------------------------------------------- */
 
-int patch_split(patch_job *j, const char *option, const char *list, char separator, int most,
-                names *n) {
-    const size_t size = strlen(list) + 1;
-    n->storage = (char *)malloc(size);
-    if (!n->storage) return fail_memory(&j->run);
-    memcpy(n->storage, list, size);
-    for (char *c = n->storage; c; n->count++) {
+/* The names up to the end of the list or, if that is a separator, to a semicolon. */
+static int split(patch_job *j, const char *option, const char **list, const char *separators, int most,
+                 names *n) {
+    const char *all = *list;
+    char name[MAX_PATH], *to = (char *)malloc(strlen(all) + 1);
+    n->storage = to;
+    if (!to) return fail_memory(&j->run);
+    do {
         if (n->count == most)
-            return cli_fail(&j->run, CLI_USAGE, "%s '%s': at most %d", option, list, most);
-        n->at[n->count] = c;
-        c = strchr(c, separator);
-        if (c) *c++ = 0;
-        if (n->at[n->count][0] == 0)
-            return cli_fail(&j->run, CLI_USAGE, "%s '%s': a name is empty", option, list);
-    }
+            return cli_fail(&j->run, CLI_USAGE, "%s '%s': at most %d", option, all, most);
+        if (!cli_take_name(list, separators, name))
+            return cli_fail(&j->run, CLI_USAGE, "%s '%s': a name is empty", option, all);
+        n->at[n->count++] = to;
+        memcpy(to, name, strlen(name) + 1);
+        to += strlen(name) + 1;
+    } while (*list && (*list)[-1] != ';');
     return CLI_DONE;
+}
+
+int patch_split(patch_job *j, const char *option, const char *list, int most, names *n) {
+    return split(j, option, &list, ",", most, n);
 }
 
 /* ---- options ------------------------------------------------------------------------------ */
 
 /* The maps of all exemplars, and how each is treated. */
 static int parse_maps(patch_job *j) {
-    names groups = {0};
     double weights[TEXPATCH_MAX_MAPS] = {1};
     int normals[TEXPATCH_MAX_MAPS] = {0}, labels[TEXPATCH_MAX_MAPS] = {0};
     int data[TEXPATCH_MAX_MAPS] = {0};
@@ -42,7 +46,7 @@ static int parse_maps(patch_job *j) {
     j->exemplar_names.count = 1;
     if (j->more) {
         names more = {0};
-        status = patch_split(j, "--exemplars", j->more, ',', TEXPATCH_MAX_EXEMPLARS - 1, &more);
+        status = patch_split(j, "--exemplars", j->more, TEXPATCH_MAX_EXEMPLARS - 1, &more);
         j->exemplar_names.storage = more.storage;
         for (int e = 0; e < more.count; e++)
             j->exemplar_names.at[j->exemplar_names.count++] = more.at[e];
@@ -50,22 +54,22 @@ static int parse_maps(patch_job *j) {
     d->exemplar_count = j->exemplar_names.count;
     d->map_count = 1;
     if (!status && j->map_list) {
-        status = patch_split(j, "--maps", j->map_list, ';', TEXPATCH_MAX_EXEMPLARS, &groups);
-        for (int e = 0; e < groups.count && !status; e++)
-            status = patch_split(j, "--maps", groups.at[e], ',', TEXPATCH_MAX_MAPS - 1,
-                                 &j->map_names[e]);
+        int groups = 0;
+        for (const char *at = j->map_list; at && !status; groups++)
+            status = groups < TEXPATCH_MAX_EXEMPLARS
+                         ? split(j, "--maps", &at, ",;", TEXPATCH_MAX_MAPS - 1, &j->map_names[groups])
+                         : cli_fail(&j->run, CLI_USAGE, "--maps '%s': at most %d", j->map_list, groups);
         d->map_count += j->map_names[0].count;
-        if (!status && groups.count != d->exemplar_count)
+        if (!status && groups != d->exemplar_count)
             status = cli_fail(&j->run, CLI_USAGE, "--maps has maps of %d exemplars, there are %d; "
-                              "separate theirs by ';'", groups.count, d->exemplar_count);
-        for (int e = 1; e < groups.count && !status; e++) {
+                              "separate theirs by ';'", groups, d->exemplar_count);
+        for (int e = 1; e < groups && !status; e++) {
             if (j->map_names[e].count != j->map_names[0].count)
                 status = cli_fail(&j->run, CLI_USAGE, "--maps has %d maps of '%s', but %d of '%s'; "
                                   "give all of each", j->map_names[0].count, j->run.inputs[0],
                                   j->map_names[e].count, j->exemplar_names.at[e]);
         }
     }
-    free(groups.storage);
     if (status) return status;
     if (j->weights) {
         weights[0] = 0;

@@ -16,7 +16,7 @@ static const cli_manual relight_manual = {
     "much the saturation changes, 'cast' what the colour of the light adds to it.\n",
     "  texkit relight forest.jpg --like slope.jpg -o overcast.png\n"
     "  texkit relight a.png --like b.png --mask a-stone.png --like-mask b-stone.png -o c.png\n",
-    1, "picture", 0, "take smaller pictures"};
+    1, "picture", 0, "take smaller pictures", NULL};
 
 typedef struct relight_job {
     cli run;

@@ -31,7 +31,7 @@ static const cli_manual retile_manual = {
     "circle over that of the circumscribed one: 1 for an equilateral triangle.\n",
     "  texkit retile bunny.obj -o bunny.glb --vertices 5000 --tiles gravel-triangles\n"
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
-    1, "mesh", 0, "take fewer vertices"};
+    1, "mesh", 0, "take fewer vertices", ".glb"};
 
 /* ---- the command line ---------------------------------------------------------------------- */
 
@@ -58,7 +58,7 @@ static int check_options(retile_job *j, const char *method) {
         return cli_fail(run, CLI_USAGE, "--instances with a texture needs an OUT in .glb; it holds "
                         "both");
     int status = CLI_DONE;
-    if (has_picture)
+    if (has_picture && !(run->to_stdout && !strcmp(j->extension, ".glb"))) /* which contains it */
         status = path_beside(run, j->texture ? "-texture.png" : "-atlas.png", j->png_path);
     if (!status && has_picture && !strcmp(j->extension, ".obj"))
         status = path_beside(run, ".mtl", j->mtl_path);
@@ -131,7 +131,7 @@ static int write_output(retile_job *j) {
     memset(&baked, 0, sizeof baked);
 
     scene.surface = &j->output;
-    if (j->png) scene.texture = name_in(j->png_path);
+    if (j->png) scene.texture = j->png_path[0] ? name_in(j->png_path) : "texture";
     if (is_glb) {
         scene.png = j->png;
         scene.png_size = j->png_size;
@@ -153,7 +153,7 @@ static int write_output(retile_job *j) {
         files[count].name = j->mtl_path;
         files[count++].bytes = mtl;
     }
-    if (!status && j->png) {
+    if (!status && j->png_path[0]) {
         files[count].name = j->png_path;
         files[count].bytes = j->png;
         files[count++].size = j->png_size;

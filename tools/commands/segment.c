@@ -18,7 +18,7 @@ static const cli_manual segment_manual = {
     "'areas' of --stats are the pixels of each label, the first eight.\n",
     "  texkit segment hillside.jpg -o hillside-labels.png --stats hillside.json\n"
     "  texkit segment hillside.jpg -o three.png --segments 3 --mask no-sky.png\n",
-    1, "picture", 0, "take a smaller picture"};
+    1, "picture", 0, "take a smaller picture", NULL};
 
 enum { COLOURS = 256 };
 

@@ -30,7 +30,7 @@ static const cli_manual tiles_manual = {
     "atlas-2.png holds the first of them, and so on.\n",
     "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
-    1, "exemplar", 1, "make smaller tiles"};
+    1, "exemplar", 1, "make smaller tiles", NULL};
 
 /* ---- the files of a set ------------------------------------------------------------------ */
 
@@ -42,7 +42,8 @@ static void name_atlas(int map, char name[24]) {
 static int announce_set(cli *run, const char *maps) {
     int status = cli_writes_inside(run, "preview.png"), count = 1;
     if (!status) status = cli_writes_inside(run, "tiles.json");
-    for (const char *at = maps; at; at = strchr(at + 1, ',')) count++;
+    char map[MAX_PATH];
+    for (const char *at = maps; at; count++) cli_take_name(&at, ",", map);
     for (int m = 0; m < count && m < TEXTILES_MAX_MAPS && !status; m++) {
         char name[24];
         name_atlas(m, name);

@@ -27,7 +27,7 @@ static const cli_manual tree_manual = {
     "  texkit tree -o oak.glb --species oak --wind 8\n"
     "  texkit tree -o mine.txt --species birch\n"
     "  texkit tree -o mine.obj --species mine.txt --tiles bark-tiles --level 3\n",
-    0, NULL, 0, "take fewer --pieces"};
+    0, NULL, 0, "take fewer --pieces", ".glb"};
 
 static const cli_manual forest_manual = {
     "forest", "--count N -o OUT [options]", "grow many different trees from the same pieces",
@@ -42,7 +42,7 @@ static const cli_manual forest_manual = {
     "instances of a piece show the same bark tiles.\n",
     "  texkit forest --count 1000 -o forest.glb --species oak,birch,spruce\n"
     "  texkit forest --count 20 -o grove.obj --species poplar --spacing 6 --pieces 200\n",
-    0, NULL, 0, "take fewer --pieces or trees"};
+    0, NULL, 0, "take fewer --pieces or trees", ".glb"};
 
 /* The species as text. */
 static int write_species(tree_job *j) {

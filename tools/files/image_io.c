@@ -31,7 +31,8 @@ void file_extension(const char *path, char extension[8]) {
 }
 
 unsigned char *file_read(const char *path, size_t *size) {
-    FILE *file = fopen(path, "rb");
+    const int is_stdin = !strcmp(path, "-");
+    FILE *file = is_stdin ? stdin : fopen(path, "rb");
     unsigned char *bytes = NULL;
     size_t capacity = 1 << 16, n = 0;
     if (!file) return NULL;
@@ -44,7 +45,7 @@ unsigned char *file_read(const char *path, size_t *size) {
         capacity *= 2;
     }
     int error = ferror(file) ? errno : bytes == NULL ? ENOMEM : n == capacity ? EFBIG : 0;
-    fclose(file);
+    if (!is_stdin) fclose(file);
     if (error) {
         free(bytes);
         bytes = NULL;

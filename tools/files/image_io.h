@@ -12,7 +12,7 @@
 
 #include "texmath.h"
 
-/* The whole file in a block for free(), or NULL with errno set. */
+/* The whole file in a block for free(), or NULL with errno set. "-" is standard input. */
 unsigned char *file_read(const char *path, size_t *size);
 
 /* Write a whole file; commands use cli_finish instead. 0: it cannot be written. */
