@@ -58,6 +58,21 @@ int check_extent(cli *run, const char *what, const char *path, const txm_image *
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size);
 
+/* ---- uneven light: even.c ------------------------------------------------------------------ */
+
+/* The option --even: CLI_INT, EVEN_AUTO if it is not given. */
+enum { EVEN_AUTO = -1, EVEN_MOST = 1000000 };
+#define EVEN_HELP "even out light that changes over R pixels; 0: never; default: if it shows"
+
+/* Refuse, before any work, a radius that cannot be. An exit status. */
+int check_even(cli *run, int radius);
+
+/* Even the light of a picture of colours: with that radius, or if it needs it, with a warning. mask:
+   NULL, or 1 channel that is white where the picture counts. *used: the radius, 0 if it was left as
+   it is. An exit status. */
+int even_picture(cli *run, const char *path, int radius, const txm_image *mask, txm_image *image,
+                 int *used);
+
 /* ---- values of options -------------------------------------------------------------------- */
 
 /* Decimal numbers low..high with commas between them, such as "1,0.5". Returns how many, at most

@@ -23,12 +23,22 @@ static void model_figures(cli *run, const texsyn_model *model, size_t bytes) {
     cli_figure(run, "bands", texsyn_band_count(model));
 }
 
+/* Even the light of the exemplar, if it needs it or the user says so. */
+static int even_example(cli *run, int even, texsyn_learn_desc *d) {
+    int used;
+    const int status = even_picture(run, run->inputs[0], even, d->mask.pixels ? &d->mask : NULL,
+                                    &d->example, &used);
+    cli_figure(run, "even", used);
+    return status;
+}
+
 static const cli_manual learn_manual = {
     "learn", "EXEMPLAR -o MODEL.txs [options]", "learn a small model of a texture from a picture",
     "EXEMPLAR is a PNG, JPEG, BMP, TGA or binary PNM picture of the texture, at least\n"
     "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is read as RGBA). About 256 x 256\n"
     "pixels that show the largest element a few dozen times are enough. The model holds\n"
-    "statistics, no pixels; 'texkit synth' makes new texture from it.\n",
+    "statistics, no pixels; 'texkit synth' makes new texture from it. If the light falls off to\n"
+    "a side or the corners are dark, it is evened out first, and a warning says so; see --even.\n",
     "  texkit learn gravel.jpg -o gravel.txs\n"
     "  texkit learn photo.png --mask grass-area.png -o grass.txs\n",
     1, "exemplar", 0, "take a smaller exemplar", ".txs"};
@@ -37,6 +47,7 @@ static int run_learn(int argc, char **argv) {
     cli run;
     texsyn_learn_desc desc = {0};
     const char *mask_path = NULL;
+    int even = EVEN_AUTO;
     const cli_option options[] = {
         {CLI_INT, "--max-distance", "D", "longest pair in pixels, 2 to 60; default 40",
          &desc.max_distance, 2, 60},
@@ -46,6 +57,7 @@ static int run_learn(int argc, char **argv) {
          &desc.levels, 1, 6},
         {CLI_INPUT, "--mask", "M", "learn only where this picture of the same size is not black",
          &mask_path, 0, 0},
+        {CLI_INT, "--even", "R", EVEN_HELP, &even, 0, EVEN_MOST},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     char extension[8];
@@ -59,6 +71,8 @@ static int run_learn(int argc, char **argv) {
     if (strcmp(extension, ".txs") != 0)
         return cli_fail(&run, CLI_USAGE, "cannot write '%s': end the model's name in .txs",
                         run.output);
+    status = check_even(&run, even);
+    if (status) return status;
 
     cli_stage(&run, "read");
     status = read_picture(&run, run.inputs[0], 0, TXM_U8, &desc.example);
@@ -68,6 +82,7 @@ static int run_learn(int argc, char **argv) {
         status = cli_fail(&run, CLI_FAILED, "the mask '%s' is %d x %d; make it %d x %d like '%s'",
                           mask_path, desc.mask.width, desc.mask.height, desc.example.width,
                           desc.example.height, run.inputs[0]);
+    if (!status) status = even_example(&run, even, &desc);
     if (status) goto done;
 
     cli_stage(&run, "learn");
@@ -103,13 +118,14 @@ static const cli_manual synth_manual = {
     "first (the file's content decides, not its name). OUT ends in .png, .tga, .bmp or\n"
     ".jpg; it has the channels of the exemplar. JPEG and BMP store gray as RGB; JPEG has no alpha. A\n"
     "higher --quality makes more sweeps over the picture: its statistics get closer to the\n"
-    "exemplar's, and it takes longer.\n",
+    "exemplar's, and it takes longer. Uneven light of a picture is evened out before it is\n"
+    "learned, as by 'texkit learn'.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
     1, "exemplar or model", 0, "take a smaller size", NULL};
 
 /* The input as a model: loaded if it is one, else learned from the picture. */
-static int get_model(cli *run, texsyn_model **model) {
+static int get_model(cli *run, int even, texsyn_model **model) {
     const char *path = run->inputs[0];
     texsyn_learn_desc learn = {0};
     char extension[8];
@@ -124,17 +140,21 @@ static int get_model(cli *run, texsyn_model **model) {
     result = texsyn_load(bytes, size, &run->env, model);
     if (result == TXM_OK) {
         model_figures(run, *model, size);
+        if (even != EVEN_AUTO)
+            status = cli_fail(run, CLI_USAGE, "--even goes with a picture, and '%s' is a model; give "
+                              "it to 'texkit learn'", path);
     } else if (!strcmp(extension, ".txs") && !image_is_known(bytes, size)) {
         status = check_result(run, result, path);
     } else if ((status = decode_picture(run, path, bytes, size, 0, TXM_U8, &learn.example))) {
         /* said already */
     } else if (!(status = check_picture_path(run, run->output, 0, 0, learn.example.channels))) {
+        status = even_example(run, even, &learn);
         cli_stage(run, "learn");
         learn.seed = run->seed;
-        result = texsyn_learn(&learn, &run->env, model);
-        if (result == TXM_OK) result = texsyn_save(*model, &run->env, NULL, 0, &size);
-        if (result == TXM_OK) model_figures(run, *model, size);
-        else status = check_result(run, result, path);
+        if (!status) result = texsyn_learn(&learn, &run->env, model);
+        if (!status && result == TXM_OK) result = texsyn_save(*model, &run->env, NULL, 0, &size);
+        if (!status && result == TXM_OK) model_figures(run, *model, size);
+        else if (!status) status = check_result(run, result, path);
     }
     image_free(&learn.example);
     free(bytes);
@@ -143,7 +163,7 @@ static int get_model(cli *run, texsyn_model **model) {
 
 static int run_synth(int argc, char **argv) {
     cli run;
-    int extent[2] = {0, 0}, tileable = 0, quality = 0, status;
+    int extent[2] = {0, 0}, tileable = 0, quality = 0, even = EVEN_AUTO, status;
     const cli_option options[] = {
         {CLI_EXTENT, "--size", "WxH", "width and height of the result in pixels", extent, 1,
          MAX_SIDE},
@@ -151,6 +171,7 @@ static int run_synth(int argc, char **argv) {
          0},
         {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0",
          &quality, -2, 2},
+        {CLI_INT, "--even", "R", EVEN_HELP, &even, 0, EVEN_MOST},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     texsyn_model *model = NULL;
@@ -162,8 +183,9 @@ static int run_synth(int argc, char **argv) {
     if (extent[0] > TEXSYN_MAX_PIXELS / extent[1])
         return cli_fail(&run, CLI_USAGE, "--size %dx%d: at most %d pixels in all", extent[0],
                         extent[1], TEXSYN_MAX_PIXELS);
-    status = check_picture_path(&run, run.output, extent[0], extent[1], 0);
-    if (!status) status = get_model(&run, &model);
+    status = check_even(&run, even);
+    if (!status) status = check_picture_path(&run, run.output, extent[0], extent[1], 0);
+    if (!status) status = get_model(&run, even, &model);
     if (!status)
         status = check_picture_path(&run, run.output, extent[0], extent[1], texsyn_channels(model));
     if (status) goto done;

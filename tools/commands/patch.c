@@ -21,6 +21,8 @@ static const cli_manual patch_manual = {
     "  OUT-normal.png. Options count maps from 0, which is EXEMPLAR.\n"
     "--exemplars E2,E3 are more pictures of the same material, of any size. Their maps follow\n"
     "  after semicolons: --maps 'M1,M2;E2-M1,E2-M2;E3-M1,E3-M2'.\n"
+    "Uneven light of EXEMPLAR and of its maps of color (not those of --normal, --label and --data,\n"
+    "  nor gray ones) is evened out, with a warning, if it would show; see --even.\n"
     "--guide and --target say what goes where: each pixel of OUT comes from a place where the\n"
     "  guide of EXEMPLAR looks like the target.\n"
     "--control STROKES is a JSON file of lines that become edges of the texture:\n"
@@ -147,6 +149,7 @@ static int run_job(patch_job *j, int argc, char **argv) {
         {CLI_INPUTS, "--exemplars", "E2,...", "more exemplars, up to 8 in all", &j->more, 0, 0},
         {CLI_INPUTS, "--mask", "M", "use EXEMPLAR only where this picture is not black; one for each",
          &j->masks, 0, 0},
+        {CLI_INT, "--even", "R", EVEN_HELP, &j->even, 0, EVEN_MOST},
         {CLI_INT, "--patch", "N",
          "side of the first patches in pixels; default: chosen for EXEMPLAR", &d->patch, 8,
          TEXPATCH_MAX_SIDE},
@@ -229,6 +232,7 @@ static int run_patch(int argc, char **argv) {
         return CLI_FAILED;
     }
     j->passes = -1;
+    j->even = EVEN_AUTO;
     const int status = run_job(j, argc, argv);
     free_job(j);
     return status;

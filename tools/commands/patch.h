@@ -29,7 +29,7 @@ typedef struct patch_job {
     const char *map_list, *weights, *normals, *labels, *data, *more, *masks, *guides, *target;
     const char *target_mask, *guide_weight, *kept_list, *keep, *novelty, *lattice, *window;
     const char *sources, *control;
-    int extent[2], passes, directx, tileable, tileable_x, tileable_y, lod, cutout;
+    int extent[2], passes, directx, tileable, tileable_x, tileable_y, lod, cutout, even;
 
     texpatch_desc desc; /* filled in while options and files are read */
     texpatch_exemplar exemplars[TEXPATCH_MAX_EXEMPLARS];

@@ -122,6 +122,23 @@ static int read_kept(patch_job *j) {
     return status;
 }
 
+/* Even the light of exemplar e; the maps of color follow, each by its own light. */
+static int even_exemplar(patch_job *j, int e) {
+    int used = 0, status = CLI_DONE;
+    const txm_image *mask = j->exemplars[e].mask.pixels ? &j->exemplars[e].mask : NULL;
+    for (int m = 0; m < j->desc.map_count && !status; m++) {
+        const texpatch_map *kind = &j->maps[m];
+        txm_image *image = &j->pictures[e][m];
+        const char *path = m ? j->map_names[e].at[m - 1] : j->exemplar_names.at[e];
+        if (kind->is_normal || kind->is_label || kind->is_data || (m && image->channels < 3)) continue;
+        int own;
+        status = even_picture(&j->run, path, m ? used : j->even, mask, image, &own);
+        if (m == 0) used = own;
+    }
+    if (e == 0) cli_figure(&j->run, "even", used);
+    return status;
+}
+
 int patch_read_all(patch_job *j) {
     texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
@@ -139,6 +156,7 @@ int patch_read_all(patch_job *j) {
     if (!status && j->target_mask)
         status = read_sized(j, "the mask", j->target_mask, 1, TXM_U8, &d->guide_mask);
     if (!status && j->keep) status = read_kept(j);
+    for (int e = 0; e < d->exemplar_count && !status; e++) status = even_exemplar(j, e);
     return status;
 }
 

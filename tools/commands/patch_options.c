@@ -217,6 +217,7 @@ int patch_check_options(patch_job *j) {
     if (!status && j->guide_weight && d->guide_weight <= 0)
         return cli_fail(run, CLI_USAGE, "--guide-weight 0: leave out --target or --control "
                         "instead");
+    if (!status) status = check_even(run, j->even);
     if (!status) status = parse_lattice(j);
     if (!status) status = parse_maps(j);
     return status;

@@ -27,7 +27,8 @@ static const cli_manual tiles_manual = {
     "edges of a tile are unchanged pixels of EXEMPLAR on both sides of the joint. A side of\n"
     "EXEMPLAR should be at least three times that of a tile.\n"
     "Maps of the same material (normals, roughness) are cut in register with --maps:\n"
-    "atlas-2.png holds the first of them, and so on.\n",
+    "atlas-2.png holds the first of them, and so on. Uneven light of EXEMPLAR and of --more and\n"
+    "--edges, not that of maps, is evened out, with a warning, if it would show; see --even.\n",
     "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
     1, "exemplar", 1, "make smaller tiles", NULL};
@@ -245,6 +246,23 @@ static int take_photo(cli *run, photos *p, const char *path) {
     return CLI_DONE;
 }
 
+/* Even the light of all photographs, but not of the maps. names: --edges and --more, for warnings. */
+static int even_photos(cli *run, photos *p, int even, const char *names[2]) {
+    int status = CLI_DONE, used;
+    char path[MAX_PATH];
+    for (int e = 0; e < p->count && !status; e++) {
+        const char *name = run->inputs[0];
+        if (e > 0) {
+            const char **list = names[0] ? &names[0] : &names[1];
+            cli_take_name(list, ",", path);
+            name = path;
+        }
+        status = even_picture(run, name, even, NULL, &p->images[e][0], &used);
+        if (e == 0) cli_figure(run, "even", used);
+    }
+    return status;
+}
+
 static void free_photos(photos *p) {
     for (int e = 0; e < p->count; e++) {
         for (int m = 0; m < p->exemplars[e].map_count; m++) image_free(&p->images[e][m]);
@@ -303,7 +321,7 @@ static int run_tiles(int argc, char **argv) {
     textiles_desc desc = {0};
     const char *kind = NULL, *packing = "packed", *repair = "poisson", *classes = NULL;
     const char *maps = NULL, *more = NULL, *edges = NULL;
-    int gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
+    int even = EVEN_AUTO, gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
     const cli_option options[] = {
         {CLI_TEXT, "--kind", "KIND", "wang, corner, triangle or frame", &kind, 0, 0},
         {CLI_INT, "--colors", "C", "colors of the edges or corners, 2 to 4 (frame: 1 to 4); default 2",
@@ -321,6 +339,7 @@ static int run_tiles(int argc, char **argv) {
         {CLI_INPUTS, "--more", "E2,E3,...", "more exemplars of the same texture", &more, 0, 0},
         {CLI_INPUTS, "--edges", "P0,P1,...", "pictures to cut the edges from, one for each color",
          &edges, 0, 0},
+        {CLI_INT, "--even", "R", EVEN_HELP, &even, 0, EVEN_MOST},
         {CLI_TEXT, "--packing", "HOW", "packed (with gutters), torus (Wei's layout) or slices",
          &packing, 0, 0},
         {CLI_INT, "--gutter", "G", "pixels around each tile, 2^n for n mip levels; default 8",
@@ -351,6 +370,7 @@ static int run_tiles(int argc, char **argv) {
                         classes);
     if (classes) desc.classes = (const int(*)[4])list;
     status = check_options(&run, &desc, (textiles_packing)packing_index, gutter, edges != NULL);
+    if (!status) status = check_even(&run, even);
     if (status) return status;
     if (maps && (more || edges))
         return cli_fail(&run, CLI_USAGE, "--maps goes with one exemplar, without --more and --edges");
@@ -374,6 +394,7 @@ static int run_tiles(int argc, char **argv) {
     }
     if (!status && more)
         status = read_list(&run, more, "--more", MAX_PHOTOS - p.count, &p, take_photo);
+    if (!status) status = even_photos(&run, &p, even, (const char *[2]){edges, more});
     if (status) goto done;
 
     cli_stage(&run, "cut");
