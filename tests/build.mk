@@ -124,6 +124,7 @@ $(TOOL_RUNS:%=$(TESTS)/check/%.done): $(TESTS)/asan/texkit
 $(TESTS)/check/tool_plane.done: $(BUILD)/examples/join examples/plane.sh
 $(TESTS)/check/wide_examples.done: $(BUILD)/files/stb.o $(BUILD)/examples/repair
 $(TESTS)/check/wide_fuzz.done: $(TESTS)/modules/texsyn.o
+$(TESTS)/check/wide_fuzz_image.done: $(TESTS)/asan/files/stb.o
 $(TESTS)/check/wide_same_bytes.done: $(GOLDEN:%=$(BUILD)/golden/golden_%)
 $(TESTS)/check/look_brush.done: $(filter %/brush,$(EXAMPLES))
 $(TESTS)/check/look_forest_gl.done: $(filter %/forest_gl,$(EXAMPLES))

@@ -262,6 +262,7 @@ static int write_by_stb(image_target *t, kind k, const txm_image *image) {
     txm_image copy;
     *t->why = image_no_memory;
     if (!image_copy(image, &copy)) return 0;
+    if (k == BMP && copy.channels == 2 && !image_convert(&copy, 4, TXM_U8)) return image_free(&copy), 0;
     const int w = copy.width, h = copy.height, c = copy.channels;
     const int ok = k == TGA ? stbi_write_tga_to_func(put_for_stb, t, w, h, c, copy.pixels)
                             : stbi_write_bmp_to_func(put_for_stb, t, w, h, c, copy.pixels);
