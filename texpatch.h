@@ -62,6 +62,9 @@
      of high frequency nearby. As it takes one candidate and not the mean, nothing is blurred.
      Differences are sums of absolute differences of bytes. At the end pieces are bent by up to 4
      pixels so that lines meet at seams, and small steps of colour there are smoothed.
+     Alpha, the last of 2 or 4 channels of a map that is neither data nor normals, says how much of
+     a pixel shows: colours are compared, averaged and bent weighted by it, and the colours of fully
+     transparent pixels never matter; those of the result are the visible neighbours'.
      A part that is synthesised again and a cell of the plane are the same kind of job, with some
      pixels given.
 
@@ -76,7 +79,8 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 60 bytes for each pixel of the output while it is made, some 6 for each pixel of the
+     RGB: some 60 bytes for each pixel of the output while it is made, and a copy of each map that
+     has transparent pixels; some 6 for each pixel of the
      exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
      bytes for each pixel along the upper and lower sides of a row of cells.
 
@@ -219,7 +223,8 @@ TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more
 
 /* Draw a map in its current state, after one step or more (before the first, TXM_BAD_ARGUMENT). out
    may be a window of the output: its top left pixel is pixel (x, y) of the output, and the window
-   must lie inside. */
+   must lie inside. Where it is transparent, colours are those of the exemplar's visible neighbours;
+   txm_image_bleed on the finished picture fits them to its own, as texpatch_make does. */
 TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
                                       txm_image out);
 
@@ -358,6 +363,10 @@ typedef struct txp_source {
     int sheets, levels, bytes, guide_at, guide_bytes;
     int has_lattice, is_random; /* is_random: no long-range order at all                        */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
+    int has_alpha;
+    int16_t alpha_at[TEXPATCH_MAX_CHANNELS]; /* of a compared byte that is a colour: the byte of its
+                                               alpha; -1: it has none                            */
+    uint8_t opaque[TEXPATCH_MAX_CHANNELS]; /* what that byte is where alpha is 1                 */
     txp_sheet sheet[TXP_MAX_SHEETS];
     txp_stack stack[TXP_MAX_LEVELS];
 } txp_source;
@@ -769,7 +778,84 @@ static void txp_cubic(double t, double w[4]) {
     w[3] = (0.5 * t - 0.5) * t * t;
 }
 
-static void txp_sample(const txm_image *im, double x, double y, int is_label, float *out) {
+/* 4 x 4 pixels and their weights */
+typedef struct txp_taps {
+    double wx[4], wy[4];
+    int x[4], y[4];
+} txp_taps;
+
+static txp_taps txp_taps_at(const txm_image *im, double x, double y) {
+    const double fx = floor(x), fy = floor(y);
+    const int ix = (int)fx, iy = (int)fy;
+    txp_taps t;
+    txp_cubic(x - fx, t.wx);
+    txp_cubic(y - fy, t.wy);
+    for (int k = 0; k < 4; k++) {
+        t.x[k] = txm_clampi(ix + k - 1, 0, im->width - 1);
+        t.y[k] = txm_clampi(iy + k - 1, 0, im->height - 1);
+    }
+    return t;
+}
+
+static inline float txp_limited(double sum, double low, double high) {
+    return txm_float(sum < low ? low : sum > high ? high : sum);
+}
+
+/* A channel, as it is. */
+static float txp_sample_channel(const txm_image *im, const txp_taps *t, int c) {
+    double sum = 0, low = 1e30, high = -1e30;
+    for (int j = 0; j < 4; j++) {
+        double row = 0;
+        for (int i = 0; i < 4; i++) {
+            const double v = txm_image_get(im, t->x[i], t->y[j], c);
+            row += t->wx[i] * v;
+            if (i == 1 || i == 2) {
+                if (j == 1 || j == 2) {
+                    low = v < low ? v : low;
+                    high = v > high ? v : high;
+                }
+            }
+        }
+        sum += t->wy[j] * row;
+    }
+    return txp_limited(sum, low, high);
+}
+
+/* The colours, weighted by alpha and within the range of the nearest visible pixels. 0: all alphas
+   are equal, or no nearest pixel is visible; then they are as they are. */
+static int txp_sample_shown(const txm_image *im, const txp_taps *t, float *out) {
+    const int colours = im->channels - 1;
+    double alpha[16], shown = 0, least = 1e30, most = -1e30;
+    int nearest = 0;
+    for (int k = 0; k < 16; k++) {
+        const double a = (double)txm_image_get(im, t->x[k % 4], t->y[k / 4], colours);
+        alpha[k] = a > 0 ? a : 0;
+        least = alpha[k] < least ? alpha[k] : least;
+        most = alpha[k] > most ? alpha[k] : most;
+        shown += t->wx[k % 4] * t->wy[k / 4] * alpha[k];
+    }
+    for (int k = 5; k < 11; k += k == 6 ? 3 : 1) nearest |= alpha[k] > 0;
+    if (least >= most || !nearest) return 0;
+    for (int c = 0; c < colours; c++) {
+        double sum = 0, low = 1e30, high = -1e30;
+        for (int k = 0; k < 16; k++) {
+            const double v = (double)txm_image_get(im, t->x[k % 4], t->y[k / 4], c);
+            const int is_nearest = k == 5 || k == 6 || k == 9 || k == 10;
+            sum += t->wx[k % 4] * t->wy[k / 4] * alpha[k] * v;
+            if (!is_nearest || !(alpha[k] > 0)) continue;
+            low = v < low ? v : low;
+            high = v > high ? v : high;
+        }
+        /* beside what shows the negative weights may outweigh the others */
+        const double mean = shown > most / 64 ? sum / shown : (double)txp_sample_channel(im, t, c);
+        out[c] = txp_limited(mean, low, high);
+    }
+    return 1;
+}
+
+/* has_alpha: the last channel says how much of the others shows */
+static void txp_sample(const txm_image *im, double x, double y, int is_label, int has_alpha,
+                       float *out) {
     const int channels = im->channels;
     if (is_label) {
         const int ix = txm_clampi((int)floor(x + 0.5), 0, im->width - 1);
@@ -777,34 +863,9 @@ static void txp_sample(const txm_image *im, double x, double y, int is_label, fl
         for (int c = 0; c < channels; c++) out[c] = txm_image_get(im, ix, iy, c);
         return;
     }
-    const double fx = floor(x), fy = floor(y);
-    const int ix = (int)fx, iy = (int)fy;
-    double wx[4], wy[4];
-    int cx[4], cy[4];
-    txp_cubic(x - fx, wx);
-    txp_cubic(y - fy, wy);
-    for (int k = 0; k < 4; k++) {
-        cx[k] = txm_clampi(ix + k - 1, 0, im->width - 1);
-        cy[k] = txm_clampi(iy + k - 1, 0, im->height - 1);
-    }
-    for (int c = 0; c < channels; c++) {
-        double sum = 0, low = 1e30, high = -1e30;
-        for (int j = 0; j < 4; j++) {
-            double row = 0;
-            for (int i = 0; i < 4; i++) {
-                const double v = txm_image_get(im, cx[i], cy[j], c);
-                row += wx[i] * v;
-                if (i == 1 || i == 2) {
-                    if (j == 1 || j == 2) {
-                        low = v < low ? v : low;
-                        high = v > high ? v : high;
-                    }
-                }
-            }
-            sum += wy[j] * row;
-        }
-        out[c] = txm_float(sum < low ? low : sum > high ? high : sum);
-    }
+    const txp_taps t = txp_taps_at(im, x, y);
+    const int first = has_alpha && txp_sample_shown(im, &t, out) ? channels - 1 : 0;
+    for (int c = first; c < channels; c++) out[c] = txp_sample_channel(im, &t, c);
 }
 
 /* The place in its exemplar of pixel (x, y) of a sheet. */
@@ -828,18 +889,27 @@ typedef struct txp_setup {
     uint64_t seed;
 } txp_setup;
 
-/* The compared bytes of a pixel of one picture; returns how many. */
-static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label, double low,
-                       double high, double weight, uint8_t *out) {
+/* Is the last channel of a map alpha? Data and normals have none: their last channel is one of them. */
+static inline int txp_has_alpha(const texpatch_map *kind, const txm_image *im) {
+    return !kind->is_normal && !kind->is_data && txm_image_has_alpha(im);
+}
+
+/* The compared bytes of a pixel of one picture; returns how many. Colours are multiplied by alpha, so
+   that they count as much as they show. */
+static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label,
+                       int has_alpha, double low, double high, double weight, uint8_t *out) {
     float v[4];
     if (whole) {
         for (int c = 0; c < im->channels; c++) v[c] = txm_image_get(im, (int)x, (int)y, c);
     } else {
-        txp_sample(im, x, y, is_label, v);
+        txp_sample(im, x, y, is_label, has_alpha, v);
     }
+    const int last = im->channels - 1;
+    const double alpha = has_alpha ? (double)txm_clampf(v[last], 0, 1) : 1;
     const double scale = high > low ? 255 / (high - low) * weight : 0;
     for (int c = 0; c < im->channels; c++) {
-        const double f = ((double)v[c] - low) * scale + 0.5;
+        const double f = has_alpha && c == last ? 255 * weight * alpha + 0.5
+                                                : ((double)v[c] - low) * scale * alpha + 0.5;
         out[c] = (uint8_t)(f < 0 ? 0 : f > 255 ? 255 : f);
     }
     return im->channels;
@@ -853,12 +923,13 @@ static void txp_features(const txp_setup *u, const txp_source *s, const txm_imag
     memset(out, 0, (size_t)s->bytes);
     for (int m = 0; m < u->map_count && maps; m++) {
         if (!(u->kinds[m].weight > 0)) continue;
-        n += txp_feature(&maps[m], x, y, whole, u->kinds[m].is_label, (double)u->low[m],
+        n += txp_feature(&maps[m], x, y, whole, u->kinds[m].is_label,
+                         txp_has_alpha(&u->kinds[m], &maps[m]), (double)u->low[m],
                          (double)u->high[m], (double)u->kinds[m].weight / most, out + n);
     }
     if (s->guide_bytes && guide)
-        txp_feature(guide, x, y, whole, 1, (double)u->guide_low, (double)u->guide_high,
-                    (double)u->guide_weight / most, out + s->guide_at);
+        txp_feature(guide, x, y, whole, 1, txm_image_has_alpha(guide), (double)u->guide_low,
+                    (double)u->guide_high, (double)u->guide_weight / most, out + s->guide_at);
 }
 
 /* Halve a level of the stack, sheet by sheet. */
@@ -1213,8 +1284,10 @@ static int txp_is_within(float x, float low, float high) {
     return x >= low && x <= high;
 }
 
-/* The smallest and largest sample of a map over all exemplars; 8- and 16-bit samples span 0..1. */
-static void txp_range(const txm_image *im, float *low, float *high) {
+/* The smallest and largest sample of a map over all exemplars; 8- and 16-bit samples span 0..1.
+   has_alpha: hidden colours do not count. */
+static void txp_range(const txm_image *im, int has_alpha, float *low, float *high) {
+    const size_t n = (size_t)im->channels;
     if (im->sample != TXM_F32) {
         *low = txm_minf(*low, 0);
         *high = txm_maxf(*high, 1);
@@ -1222,7 +1295,8 @@ static void txp_range(const txm_image *im, float *low, float *high) {
     }
     for (int y = 0; y < im->height; y++) {
         const float *row = (const float *)txm_image_row_const(im, y);
-        for (size_t i = 0; i < (size_t)im->width * (size_t)im->channels; i++) {
+        for (size_t i = 0; i < (size_t)im->width * n; i++) {
+            if (has_alpha && !(row[i / n * n + n - 1] > 0)) continue;
             *low = txm_minf(*low, row[i]);
             *high = txm_maxf(*high, row[i]);
         }
@@ -1245,6 +1319,56 @@ static txm_status txp_check_mask(const txm_image *im, const char *name, int widt
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
                            "must be TXM_U8 with 1 channel and the size of its picture");
     return TXM_OK;
+}
+
+/* Which of the compared bytes are alpha, and of which others. */
+static void txp_find_alphas(const txp_setup *u, txp_source *s) {
+    int n = 0;
+    memset(s->alpha_at, -1, sizeof s->alpha_at);
+    for (int m = 0; m < u->map_count; m++) {
+        const txm_image *im = &u->maps[0][m];
+        if (!(u->kinds[m].weight > 0)) continue;
+        for (int c = 0; c < im->channels - 1 && txp_has_alpha(&u->kinds[m], im); c++) {
+            const double weight = (double)u->kinds[m].weight / (double)u->most_weight;
+            s->has_alpha = 1;
+            s->alpha_at[n + c] = (int16_t)(n + im->channels - 1);
+            s->opaque[n + c] = (uint8_t)(255 * weight + 0.5);
+        }
+        n += im->channels;
+    }
+}
+
+/* A picture whose hidden colours are those of visible neighbours; of labels 0, for one label is not
+   between others. The picture as it is if nothing is hidden, else a copy in memory. */
+static txm_status txp_show(txm_image *im, int is_label, int wrap, txm_arena *memory, txm_env *env) {
+    const txm_status status = txm_image_bled(im, wrap, memory, env, im);
+    if (status != TXM_OK || !is_label || !txm_image_has_hidden(im)) return status;
+    const size_t bytes = (size_t)im->channels * txm_sample_bytes(im->sample);
+    for (int y = 0; y < im->height; y++) {
+        char *pixel = (char *)txm_image_row(im, y);
+        for (int x = 0; x < im->width; x++, pixel += bytes) {
+            if (!(txm_image_get(im, x, y, im->channels - 1) > 0)) memset(pixel, 0, bytes);
+        }
+    }
+    return status;
+}
+
+/* Replace all pictures of a setup in which colour is hidden. */
+static txm_status txp_show_all(txp_setup *u, txm_arena *memory, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int e = 0; e < u->exemplar_count && status == TXM_OK; e++) {
+        for (int m = 0; m < u->map_count && status == TXM_OK; m++) {
+            if (txp_has_alpha(&u->kinds[m], &u->maps[e][m]))
+                status = txp_show(&u->maps[e][m], u->kinds[m].is_label, 0, memory, env);
+        }
+        if (status == TXM_OK && u->guides[e].pixels)
+            status = txp_show(&u->guides[e], 0, 0, memory, env);
+    }
+    for (int m = 0; m < u->map_count && status == TXM_OK; m++) {
+        if (u->kept[m].pixels && txp_has_alpha(&u->kinds[m], &u->kept[m]))
+            status = txp_show(&u->kept[m], u->kinds[m].is_label, u->tileable, memory, env);
+    }
+    return status;
 }
 
 /* The fields about exemplars and how they are treated; u and s are set. */
@@ -1314,7 +1438,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
                                 "all exemplars the same channels and samples");
             if (u->kinds[m].is_normal && im->channels < 3)
                 return txm_fail(env, TXM_BAD_ARGUMENT, "a normal map has 3 or 4 channels");
-            txp_range(im, &u->low[m], &u->high[m]);
+            txp_range(im, txp_has_alpha(&u->kinds[m], im), &u->low[m], &u->high[m]);
             if (e == 0 && u->kinds[m].weight > 0) bytes += im->channels;
         }
         const int w = u->maps[e][0].width, h = u->maps[e][0].height;
@@ -1335,7 +1459,8 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
                 return txm_fail(env, TXM_BAD_ARGUMENT,
                                 "a guide has the size of its exemplar, and "
                                 "all have the same channels and samples");
-            txp_range(&u->guides[e], &u->guide_low, &u->guide_high);
+            txp_range(&u->guides[e], txm_image_has_alpha(&u->guides[e]), &u->guide_low,
+                      &u->guide_high);
         }
         if (x->mask.pixels) {
             status = txp_check_mask(&x->mask, "mask", w, h, env);
@@ -1358,6 +1483,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
     s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
     s->guide_at = s->guide_bytes ? bytes : s->bytes;
+    txp_find_alphas(u, s);
     return TXM_OK;
 }
 
@@ -2190,6 +2316,7 @@ enum {
     TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
     TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
 };
+#define TXP_FAINT 0.125 /* share of alpha below which the colour of a seam says too little     */
 #define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
 #define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
 
@@ -2344,6 +2471,32 @@ static int txp_seam_cached(const txp_source *s, txp_seam *seams, int x, int y, t
     return m->found;
 }
 
+/* The step of colour between 5 x 5 pixels of two pieces, summed over them, for each compared byte.
+   That of a colour is between the means of what shows of both; none where next to nothing shows. */
+static void txp_seam_step(const txp_source *s, const txp_stack *k, txp_place a, txp_place b,
+                          int sum[TEXPATCH_MAX_CHANNELS]) {
+    int of_a[TEXPATCH_MAX_CHANNELS] = {0};
+    for (int v = 0; v < 5; v++) {
+        const uint8_t *pa = txp_stack_at(s, k, a.x, a.y + v);
+        const uint8_t *pb = txp_stack_at(s, k, b.x, b.y + v);
+        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
+            for (int c = 0; c < s->guide_at; c++) {
+                sum[c] += pa[c] - pb[c];
+                of_a[c] += pa[c];
+            }
+        }
+    }
+    for (int c = 0; c < s->guide_at && s->has_alpha; c++) {
+        const int alpha = s->alpha_at[c];
+        if (alpha < 0) continue;
+        const double all = 25 * s->opaque[c], of_b = of_a[c] - sum[c];
+        const double shown_a = of_a[alpha], shown_b = of_a[alpha] - sum[alpha];
+        if (shown_a >= all && shown_b >= all) continue;
+        if (shown_a < TXP_FAINT * all || shown_b < TXP_FAINT * all) sum[c] = 0;
+        else sum[c] = (int)floor(of_a[c] * all / shown_a - of_b * all / shown_b + 0.5);
+    }
+}
+
 /* Pixel j shall be `jump` above i. */
 static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t lane, int jump) {
     int16_t *a = f->jump + i * (size_t)f->lanes + lane,
@@ -2398,13 +2551,9 @@ static void txp_measure_band(void *context, int lane) {
                           by = q.y + shift[1] - 2;
                 int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
                 if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    for (int v = 0; v < 5; v++) {
-                        const uint8_t *pa = txp_stack_at(s, k, ax, ay + v);
-                        const uint8_t *pb = txp_stack_at(s, k, bx, by + v);
-                        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
-                            for (int b = 0; b < s->guide_at; b++) sum[b] += pa[b] - pb[b];
-                        }
-                    }
+                    const txp_place from_a = {(int16_t)ax, (int16_t)ay};
+                    const txp_place from_b = {(int16_t)bx, (int16_t)by};
+                    txp_seam_step(s, k, from_a, from_b, sum);
                     for (int b = 0; b < s->guide_at; b++)
                         most = abs(sum[b]) > most ? abs(sum[b]) : most;
                     if (most < low) *tone = 255;
@@ -2984,8 +3133,15 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     txm_status status = txp_check_exemplars(desc, &setup, &source, env);
     if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
     if (status != TXM_OK) return status;
-    status = txp_source_make(&setup, &source, &s, &source_memory, env);
-    if (status != TXM_OK) return status;
+    txm_arena_init(&memory, env);
+    txm_image guide = txm_image_resolve(desc->guide);
+    status = txp_show_all(&setup, &memory, env);
+    if (status == TXM_OK && guide.pixels) status = txp_show(&guide, 0, desc->tileable, &memory, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
+    if (status != TXM_OK) {
+        txm_arena_free(&memory);
+        return status;
+    }
 
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
     const int room = 2 * TXP_WINDOW << (s->levels - 1); /* for a few patches */
@@ -2994,7 +3150,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!wx && width < room) width = room;
     if (!wy && height < room) height = room;
     const size_t pixels = (size_t)width * (size_t)height;
-    txm_arena_init(&memory, env);
     texpatch_job *job = txp_job_make(&setup, s, width, height, desc->seed, &memory, env);
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
@@ -3015,7 +3170,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
             }
         }
         if (s->guide_bytes) {
-            const txm_image guide = txm_image_resolve(desc->guide);
             const txm_image mask =
                 desc->guide_mask.pixels ? txm_image_resolve(desc->guide_mask) : desc->guide_mask;
             txp_guide_load(job, &guide, &mask, &job->given);
@@ -3262,8 +3416,16 @@ typedef struct txp_draw {
     int map, x, y;
     int tone_at; /* first compared byte of the map; -1: it has no tone                        */
     double tone_scale;
+    int has_alpha;
     txm_image out;
 } txp_draw;
+
+/* What is opaque stays opaque and what is transparent stays transparent; alphas between may change
+   their tone: 1 at a half, 0 at both ends. */
+static inline double txp_half_shown(float alpha) {
+    const double a = (double)txm_clampf(alpha, 0, 1);
+    return 4 * a * (1 - a);
+}
 
 static void txp_draw_row(void *context, int row) {
     const txp_draw *d = (const txp_draw *)context;
@@ -3300,12 +3462,15 @@ static void txp_draw_row(void *context, int row) {
         if (p.is_whole && sheet->plain) {
             for (int c = 0; c < channels; c++) v[c] = txm_image_get(im, (int)ex, (int)ey, c);
         } else {
-            txp_sample(im, ex, ey, u->kinds[d->map].is_label, v);
+            txp_sample(im, ex, ey, u->kinds[d->map].is_label, d->has_alpha, v);
         }
         if (p.tone && d->tone_at >= 0) {
-            for (int c = 0; c < channels; c++)
-                v[c] = txm_clampf(txm_float(v[c] + d->tone_scale * (double)p.tone[d->tone_at + c]),
-                                  low, high);
+            for (int c = 0; c < channels; c++) {
+                double scale = d->tone_scale;
+                if (d->has_alpha && c == channels - 1) scale *= txp_half_shown(v[c]);
+                v[c] = txm_clampf(txm_float(v[c] + scale * (double)p.tone[d->tone_at + c]), low,
+                                  high);
+            }
         }
         if (u->kinds[d->map].is_normal) txp_normal(u, d->map, sheet, v);
         for (int c = 0; c < channels; c++) txm_image_set(&d->out, x, row, c, v[c]);
@@ -3319,6 +3484,7 @@ static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_
     if (status != TXM_OK) return status;
     d->map = map;
     d->out = txm_image_resolve(out);
+    d->has_alpha = txp_has_alpha(&u->kinds[map], &d->out);
     if (d->out.channels != u->maps[0][map].channels || d->out.sample != u->maps[0][map].sample)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
                            "must have the channels and samples of its map");
@@ -3401,6 +3567,8 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
         if (!draws[m].out.pixels)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the picture");
         else status = txp_draw_rows(&draws[m], 1, env);
+        if (status == TXM_OK && draws[m].has_alpha && !job->setup.kinds[m].is_label)
+            status = txm_image_bleed(&draws[m].out, job->setup.tileable, env);
     }
     for (int m = 0; m < maps && status == TXM_OK; m++) {
         const txm_image to = txm_image_resolve(out[m]);
@@ -3495,7 +3663,12 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     if (guide) {
         txp_given_make(&new_guide, s, all, 0, 1, 0, &memory);
         if (memory.failed) goto no_memory;
-        const txm_image to = txm_image_resolve(*guide);
+        txm_image to = txm_image_resolve(*guide);
+        status = txp_show(&to, 0, u->tileable, &memory, env);
+        if (status != TXM_OK) {
+            txm_arena_free(&memory);
+            return status;
+        }
         txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
     }
     if (high_x >= 0) {
@@ -3806,12 +3979,18 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
         plain.exemplars = exemplars;
     }
     txm_status status = txp_check_exemplars(&plain, &setup, &source, env);
-    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
     if (status != TXM_OK) return status;
     txm_arena_init(&memory, env);
+    status = txp_show_all(&setup, &memory, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
+    if (status != TXM_OK) {
+        txm_arena_free(&memory);
+        return status;
+    }
     texpatch_plane *plane = (texpatch_plane *)txm_arena_zero(&memory, 1, sizeof *plane);
     if (!plane) {
         txm_arena_free(&source_memory);
+        txm_arena_free(&memory);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a plane");
     }
     plane->setup = setup;

@@ -62,6 +62,9 @@
      of high frequency nearby. As it takes one candidate and not the mean, nothing is blurred.
      Differences are sums of absolute differences of bytes. At the end pieces are bent by up to 4
      pixels so that lines meet at seams, and small steps of colour there are smoothed.
+     Alpha, the last of 2 or 4 channels of a map that is neither data nor normals, says how much of
+     a pixel shows: colours are compared, averaged and bent weighted by it, and the colours of fully
+     transparent pixels never matter; those of the result are the visible neighbours'.
      A part that is synthesised again and a cell of the plane are the same kind of job, with some
      pixels given.
 
@@ -76,7 +79,8 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 60 bytes for each pixel of the output while it is made, some 6 for each pixel of the
+     RGB: some 60 bytes for each pixel of the output while it is made, and a copy of each map that
+     has transparent pixels; some 6 for each pixel of the
      exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
      bytes for each pixel along the upper and lower sides of a row of cells.
 
@@ -219,7 +223,8 @@ TEXPATCH_API txm_status texpatch_step(texpatch_job *job, txm_env *env, int *more
 
 /* Draw a map in its current state, after one step or more (before the first, TXM_BAD_ARGUMENT). out
    may be a window of the output: its top left pixel is pixel (x, y) of the output, and the window
-   must lie inside. */
+   must lie inside. Where it is transparent, colours are those of the exemplar's visible neighbours;
+   txm_image_bleed on the finished picture fits them to its own, as texpatch_make does. */
 TEXPATCH_API txm_status texpatch_draw(const texpatch_job *job, int map, int x, int y, txm_env *env,
                                       txm_image out);
 

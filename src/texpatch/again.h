@@ -85,7 +85,12 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     if (guide) {
         txp_given_make(&new_guide, s, all, 0, 1, 0, &memory);
         if (memory.failed) goto no_memory;
-        const txm_image to = txm_image_resolve(*guide);
+        txm_image to = txm_image_resolve(*guide);
+        status = txp_show(&to, 0, u->tileable, &memory, env);
+        if (status != TXM_OK) {
+            txm_arena_free(&memory);
+            return status;
+        }
         txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
     }
     if (high_x >= 0) {

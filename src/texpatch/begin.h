@@ -88,8 +88,15 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     txm_status status = txp_check_exemplars(desc, &setup, &source, env);
     if (status == TXM_OK) status = txp_check_output(desc, &setup, &source, env);
     if (status != TXM_OK) return status;
-    status = txp_source_make(&setup, &source, &s, &source_memory, env);
-    if (status != TXM_OK) return status;
+    txm_arena_init(&memory, env);
+    txm_image guide = txm_image_resolve(desc->guide);
+    status = txp_show_all(&setup, &memory, env);
+    if (status == TXM_OK && guide.pixels) status = txp_show(&guide, 0, desc->tileable, &memory, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
+    if (status != TXM_OK) {
+        txm_arena_free(&memory);
+        return status;
+    }
 
     const int wx = desc->tileable & TEXPATCH_TILE_X, wy = desc->tileable & TEXPATCH_TILE_Y;
     const int room = 2 * TXP_WINDOW << (s->levels - 1); /* for a few patches */
@@ -98,7 +105,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!wx && width < room) width = room;
     if (!wy && height < room) height = room;
     const size_t pixels = (size_t)width * (size_t)height;
-    txm_arena_init(&memory, env);
     texpatch_job *job = txp_job_make(&setup, s, width, height, desc->seed, &memory, env);
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
@@ -119,7 +125,6 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
             }
         }
         if (s->guide_bytes) {
-            const txm_image guide = txm_image_resolve(desc->guide);
             const txm_image mask =
                 desc->guide_mask.pixels ? txm_image_resolve(desc->guide_mask) : desc->guide_mask;
             txp_guide_load(job, &guide, &mask, &job->given);

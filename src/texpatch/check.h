@@ -9,8 +9,10 @@ static int txp_is_within(float x, float low, float high) {
     return x >= low && x <= high;
 }
 
-/* The smallest and largest sample of a map over all exemplars; 8- and 16-bit samples span 0..1. */
-static void txp_range(const txm_image *im, float *low, float *high) {
+/* The smallest and largest sample of a map over all exemplars; 8- and 16-bit samples span 0..1.
+   has_alpha: hidden colours do not count. */
+static void txp_range(const txm_image *im, int has_alpha, float *low, float *high) {
+    const size_t n = (size_t)im->channels;
     if (im->sample != TXM_F32) {
         *low = txm_minf(*low, 0);
         *high = txm_maxf(*high, 1);
@@ -18,7 +20,8 @@ static void txp_range(const txm_image *im, float *low, float *high) {
     }
     for (int y = 0; y < im->height; y++) {
         const float *row = (const float *)txm_image_row_const(im, y);
-        for (size_t i = 0; i < (size_t)im->width * (size_t)im->channels; i++) {
+        for (size_t i = 0; i < (size_t)im->width * n; i++) {
+            if (has_alpha && !(row[i / n * n + n - 1] > 0)) continue;
             *low = txm_minf(*low, row[i]);
             *high = txm_maxf(*high, row[i]);
         }
@@ -41,6 +44,56 @@ static txm_status txp_check_mask(const txm_image *im, const char *name, int widt
         return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
                            "must be TXM_U8 with 1 channel and the size of its picture");
     return TXM_OK;
+}
+
+/* Which of the compared bytes are alpha, and of which others. */
+static void txp_find_alphas(const txp_setup *u, txp_source *s) {
+    int n = 0;
+    memset(s->alpha_at, -1, sizeof s->alpha_at);
+    for (int m = 0; m < u->map_count; m++) {
+        const txm_image *im = &u->maps[0][m];
+        if (!(u->kinds[m].weight > 0)) continue;
+        for (int c = 0; c < im->channels - 1 && txp_has_alpha(&u->kinds[m], im); c++) {
+            const double weight = (double)u->kinds[m].weight / (double)u->most_weight;
+            s->has_alpha = 1;
+            s->alpha_at[n + c] = (int16_t)(n + im->channels - 1);
+            s->opaque[n + c] = (uint8_t)(255 * weight + 0.5);
+        }
+        n += im->channels;
+    }
+}
+
+/* A picture whose hidden colours are those of visible neighbours; of labels 0, for one label is not
+   between others. The picture as it is if nothing is hidden, else a copy in memory. */
+static txm_status txp_show(txm_image *im, int is_label, int wrap, txm_arena *memory, txm_env *env) {
+    const txm_status status = txm_image_bled(im, wrap, memory, env, im);
+    if (status != TXM_OK || !is_label || !txm_image_has_hidden(im)) return status;
+    const size_t bytes = (size_t)im->channels * txm_sample_bytes(im->sample);
+    for (int y = 0; y < im->height; y++) {
+        char *pixel = (char *)txm_image_row(im, y);
+        for (int x = 0; x < im->width; x++, pixel += bytes) {
+            if (!(txm_image_get(im, x, y, im->channels - 1) > 0)) memset(pixel, 0, bytes);
+        }
+    }
+    return status;
+}
+
+/* Replace all pictures of a setup in which colour is hidden. */
+static txm_status txp_show_all(txp_setup *u, txm_arena *memory, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int e = 0; e < u->exemplar_count && status == TXM_OK; e++) {
+        for (int m = 0; m < u->map_count && status == TXM_OK; m++) {
+            if (txp_has_alpha(&u->kinds[m], &u->maps[e][m]))
+                status = txp_show(&u->maps[e][m], u->kinds[m].is_label, 0, memory, env);
+        }
+        if (status == TXM_OK && u->guides[e].pixels)
+            status = txp_show(&u->guides[e], 0, 0, memory, env);
+    }
+    for (int m = 0; m < u->map_count && status == TXM_OK; m++) {
+        if (u->kept[m].pixels && txp_has_alpha(&u->kinds[m], &u->kept[m]))
+            status = txp_show(&u->kept[m], u->kinds[m].is_label, u->tileable, memory, env);
+    }
+    return status;
 }
 
 /* The fields about exemplars and how they are treated; u and s are set. */
@@ -110,7 +163,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
                                 "all exemplars the same channels and samples");
             if (u->kinds[m].is_normal && im->channels < 3)
                 return txm_fail(env, TXM_BAD_ARGUMENT, "a normal map has 3 or 4 channels");
-            txp_range(im, &u->low[m], &u->high[m]);
+            txp_range(im, txp_has_alpha(&u->kinds[m], im), &u->low[m], &u->high[m]);
             if (e == 0 && u->kinds[m].weight > 0) bytes += im->channels;
         }
         const int w = u->maps[e][0].width, h = u->maps[e][0].height;
@@ -131,7 +184,8 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
                 return txm_fail(env, TXM_BAD_ARGUMENT,
                                 "a guide has the size of its exemplar, and "
                                 "all have the same channels and samples");
-            txp_range(&u->guides[e], &u->guide_low, &u->guide_high);
+            txp_range(&u->guides[e], txm_image_has_alpha(&u->guides[e]), &u->guide_low,
+                      &u->guide_high);
         }
         if (x->mask.pixels) {
             status = txp_check_mask(&x->mask, "mask", w, h, env);
@@ -154,6 +208,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
     s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
     s->guide_at = s->guide_bytes ? bytes : s->bytes;
+    txp_find_alphas(u, s);
     return TXM_OK;
 }
 

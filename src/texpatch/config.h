@@ -62,6 +62,10 @@ typedef struct txp_source {
     int sheets, levels, bytes, guide_at, guide_bytes;
     int has_lattice, is_random; /* is_random: no long-range order at all                        */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
+    int has_alpha;
+    int16_t alpha_at[TEXPATCH_MAX_CHANNELS]; /* of a compared byte that is a colour: the byte of its
+                                               alpha; -1: it has none                            */
+    uint8_t opaque[TEXPATCH_MAX_CHANNELS]; /* what that byte is where alpha is 1                 */
     txp_sheet sheet[TXP_MAX_SHEETS];
     txp_stack stack[TXP_MAX_LEVELS];
 } txp_source;

@@ -87,8 +87,16 @@ typedef struct txp_draw {
     int map, x, y;
     int tone_at; /* first compared byte of the map; -1: it has no tone                        */
     double tone_scale;
+    int has_alpha;
     txm_image out;
 } txp_draw;
+
+/* What is opaque stays opaque and what is transparent stays transparent; alphas between may change
+   their tone: 1 at a half, 0 at both ends. */
+static inline double txp_half_shown(float alpha) {
+    const double a = (double)txm_clampf(alpha, 0, 1);
+    return 4 * a * (1 - a);
+}
 
 static void txp_draw_row(void *context, int row) {
     const txp_draw *d = (const txp_draw *)context;
@@ -125,12 +133,15 @@ static void txp_draw_row(void *context, int row) {
         if (p.is_whole && sheet->plain) {
             for (int c = 0; c < channels; c++) v[c] = txm_image_get(im, (int)ex, (int)ey, c);
         } else {
-            txp_sample(im, ex, ey, u->kinds[d->map].is_label, v);
+            txp_sample(im, ex, ey, u->kinds[d->map].is_label, d->has_alpha, v);
         }
         if (p.tone && d->tone_at >= 0) {
-            for (int c = 0; c < channels; c++)
-                v[c] = txm_clampf(txm_float(v[c] + d->tone_scale * (double)p.tone[d->tone_at + c]),
-                                  low, high);
+            for (int c = 0; c < channels; c++) {
+                double scale = d->tone_scale;
+                if (d->has_alpha && c == channels - 1) scale *= txp_half_shown(v[c]);
+                v[c] = txm_clampf(txm_float(v[c] + scale * (double)p.tone[d->tone_at + c]), low,
+                                  high);
+            }
         }
         if (u->kinds[d->map].is_normal) txp_normal(u, d->map, sheet, v);
         for (int c = 0; c < channels; c++) txm_image_set(&d->out, x, row, c, v[c]);
@@ -144,6 +155,7 @@ static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_
     if (status != TXM_OK) return status;
     d->map = map;
     d->out = txm_image_resolve(out);
+    d->has_alpha = txp_has_alpha(&u->kinds[map], &d->out);
     if (d->out.channels != u->maps[0][map].channels || d->out.sample != u->maps[0][map].sample)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
                            "must have the channels and samples of its map");
@@ -226,6 +238,8 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
         if (!draws[m].out.pixels)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the picture");
         else status = txp_draw_rows(&draws[m], 1, env);
+        if (status == TXM_OK && draws[m].has_alpha && !job->setup.kinds[m].is_label)
+            status = txm_image_bleed(&draws[m].out, job->setup.tileable, env);
     }
     for (int m = 0; m < maps && status == TXM_OK; m++) {
         const txm_image to = txm_image_resolve(out[m]);

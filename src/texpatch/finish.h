@@ -19,6 +19,7 @@ enum {
     TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
     TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
 };
+#define TXP_FAINT 0.125 /* share of alpha below which the colour of a seam says too little     */
 #define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
 #define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
 
@@ -173,6 +174,32 @@ static int txp_seam_cached(const txp_source *s, txp_seam *seams, int x, int y, t
     return m->found;
 }
 
+/* The step of colour between 5 x 5 pixels of two pieces, summed over them, for each compared byte.
+   That of a colour is between the means of what shows of both; none where next to nothing shows. */
+static void txp_seam_step(const txp_source *s, const txp_stack *k, txp_place a, txp_place b,
+                          int sum[TEXPATCH_MAX_CHANNELS]) {
+    int of_a[TEXPATCH_MAX_CHANNELS] = {0};
+    for (int v = 0; v < 5; v++) {
+        const uint8_t *pa = txp_stack_at(s, k, a.x, a.y + v);
+        const uint8_t *pb = txp_stack_at(s, k, b.x, b.y + v);
+        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
+            for (int c = 0; c < s->guide_at; c++) {
+                sum[c] += pa[c] - pb[c];
+                of_a[c] += pa[c];
+            }
+        }
+    }
+    for (int c = 0; c < s->guide_at && s->has_alpha; c++) {
+        const int alpha = s->alpha_at[c];
+        if (alpha < 0) continue;
+        const double all = 25 * s->opaque[c], of_b = of_a[c] - sum[c];
+        const double shown_a = of_a[alpha], shown_b = of_a[alpha] - sum[alpha];
+        if (shown_a >= all && shown_b >= all) continue;
+        if (shown_a < TXP_FAINT * all || shown_b < TXP_FAINT * all) sum[c] = 0;
+        else sum[c] = (int)floor(of_a[c] * all / shown_a - of_b * all / shown_b + 0.5);
+    }
+}
+
 /* Pixel j shall be `jump` above i. */
 static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t lane, int jump) {
     int16_t *a = f->jump + i * (size_t)f->lanes + lane,
@@ -227,13 +254,9 @@ static void txp_measure_band(void *context, int lane) {
                           by = q.y + shift[1] - 2;
                 int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
                 if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    for (int v = 0; v < 5; v++) {
-                        const uint8_t *pa = txp_stack_at(s, k, ax, ay + v);
-                        const uint8_t *pb = txp_stack_at(s, k, bx, by + v);
-                        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
-                            for (int b = 0; b < s->guide_at; b++) sum[b] += pa[b] - pb[b];
-                        }
-                    }
+                    const txp_place from_a = {(int16_t)ax, (int16_t)ay};
+                    const txp_place from_b = {(int16_t)bx, (int16_t)by};
+                    txp_seam_step(s, k, from_a, from_b, sum);
                     for (int b = 0; b < s->guide_at; b++)
                         most = abs(sum[b]) > most ? abs(sum[b]) : most;
                     if (most < low) *tone = 255;

@@ -248,12 +248,18 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
         plain.exemplars = exemplars;
     }
     txm_status status = txp_check_exemplars(&plain, &setup, &source, env);
-    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
     if (status != TXM_OK) return status;
     txm_arena_init(&memory, env);
+    status = txp_show_all(&setup, &memory, env);
+    if (status == TXM_OK) status = txp_source_make(&setup, &source, &s, &source_memory, env);
+    if (status != TXM_OK) {
+        txm_arena_free(&memory);
+        return status;
+    }
     texpatch_plane *plane = (texpatch_plane *)txm_arena_zero(&memory, 1, sizeof *plane);
     if (!plane) {
         txm_arena_free(&source_memory);
+        txm_arena_free(&memory);
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a plane");
     }
     plane->setup = setup;

@@ -15,7 +15,84 @@ static void txp_cubic(double t, double w[4]) {
     w[3] = (0.5 * t - 0.5) * t * t;
 }
 
-static void txp_sample(const txm_image *im, double x, double y, int is_label, float *out) {
+/* 4 x 4 pixels and their weights */
+typedef struct txp_taps {
+    double wx[4], wy[4];
+    int x[4], y[4];
+} txp_taps;
+
+static txp_taps txp_taps_at(const txm_image *im, double x, double y) {
+    const double fx = floor(x), fy = floor(y);
+    const int ix = (int)fx, iy = (int)fy;
+    txp_taps t;
+    txp_cubic(x - fx, t.wx);
+    txp_cubic(y - fy, t.wy);
+    for (int k = 0; k < 4; k++) {
+        t.x[k] = txm_clampi(ix + k - 1, 0, im->width - 1);
+        t.y[k] = txm_clampi(iy + k - 1, 0, im->height - 1);
+    }
+    return t;
+}
+
+static inline float txp_limited(double sum, double low, double high) {
+    return txm_float(sum < low ? low : sum > high ? high : sum);
+}
+
+/* A channel, as it is. */
+static float txp_sample_channel(const txm_image *im, const txp_taps *t, int c) {
+    double sum = 0, low = 1e30, high = -1e30;
+    for (int j = 0; j < 4; j++) {
+        double row = 0;
+        for (int i = 0; i < 4; i++) {
+            const double v = txm_image_get(im, t->x[i], t->y[j], c);
+            row += t->wx[i] * v;
+            if (i == 1 || i == 2) {
+                if (j == 1 || j == 2) {
+                    low = v < low ? v : low;
+                    high = v > high ? v : high;
+                }
+            }
+        }
+        sum += t->wy[j] * row;
+    }
+    return txp_limited(sum, low, high);
+}
+
+/* The colours, weighted by alpha and within the range of the nearest visible pixels. 0: all alphas
+   are equal, or no nearest pixel is visible; then they are as they are. */
+static int txp_sample_shown(const txm_image *im, const txp_taps *t, float *out) {
+    const int colours = im->channels - 1;
+    double alpha[16], shown = 0, least = 1e30, most = -1e30;
+    int nearest = 0;
+    for (int k = 0; k < 16; k++) {
+        const double a = (double)txm_image_get(im, t->x[k % 4], t->y[k / 4], colours);
+        alpha[k] = a > 0 ? a : 0;
+        least = alpha[k] < least ? alpha[k] : least;
+        most = alpha[k] > most ? alpha[k] : most;
+        shown += t->wx[k % 4] * t->wy[k / 4] * alpha[k];
+    }
+    for (int k = 5; k < 11; k += k == 6 ? 3 : 1) nearest |= alpha[k] > 0;
+    if (least >= most || !nearest) return 0;
+    for (int c = 0; c < colours; c++) {
+        double sum = 0, low = 1e30, high = -1e30;
+        for (int k = 0; k < 16; k++) {
+            const double v = (double)txm_image_get(im, t->x[k % 4], t->y[k / 4], c);
+            const int is_nearest = k == 5 || k == 6 || k == 9 || k == 10;
+            sum += t->wx[k % 4] * t->wy[k / 4] * alpha[k] * v;
+            if (!is_nearest || !(alpha[k] > 0)) continue;
+            low = v < low ? v : low;
+            high = v > high ? v : high;
+        }
+        /* beside what shows the negative weights may outweigh the others */
+        const double mean = shown > most / 64 ? sum / shown : (double)txp_sample_channel(im, t, c);
+        out[c] = txp_limited(mean, low, high);
+    }
+    return 1;
+}
+
+/* has_alpha: the last channel says how much of the others shows */
+static void txp_sample(const txm_image *im, double x, double y, int is_label, int has_alpha,
+                       float *out) {
     const int channels = im->channels;
     if (is_label) {
         const int ix = txm_clampi((int)floor(x + 0.5), 0, im->width - 1);
@@ -23,34 +100,9 @@ static void txp_sample(const txm_image *im, double x, double y, int is_label, fl
         for (int c = 0; c < channels; c++) out[c] = txm_image_get(im, ix, iy, c);
         return;
     }
-    const double fx = floor(x), fy = floor(y);
-    const int ix = (int)fx, iy = (int)fy;
-    double wx[4], wy[4];
-    int cx[4], cy[4];
-    txp_cubic(x - fx, wx);
-    txp_cubic(y - fy, wy);
-    for (int k = 0; k < 4; k++) {
-        cx[k] = txm_clampi(ix + k - 1, 0, im->width - 1);
-        cy[k] = txm_clampi(iy + k - 1, 0, im->height - 1);
-    }
-    for (int c = 0; c < channels; c++) {
-        double sum = 0, low = 1e30, high = -1e30;
-        for (int j = 0; j < 4; j++) {
-            double row = 0;
-            for (int i = 0; i < 4; i++) {
-                const double v = txm_image_get(im, cx[i], cy[j], c);
-                row += wx[i] * v;
-                if (i == 1 || i == 2) {
-                    if (j == 1 || j == 2) {
-                        low = v < low ? v : low;
-                        high = v > high ? v : high;
-                    }
-                }
-            }
-            sum += wy[j] * row;
-        }
-        out[c] = txm_float(sum < low ? low : sum > high ? high : sum);
-    }
+    const txp_taps t = txp_taps_at(im, x, y);
+    const int first = has_alpha && txp_sample_shown(im, &t, out) ? channels - 1 : 0;
+    for (int c = first; c < channels; c++) out[c] = txp_sample_channel(im, &t, c);
 }
 
 /* The place in its exemplar of pixel (x, y) of a sheet. */
@@ -74,18 +126,27 @@ typedef struct txp_setup {
     uint64_t seed;
 } txp_setup;
 
-/* The compared bytes of a pixel of one picture; returns how many. */
-static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label, double low,
-                       double high, double weight, uint8_t *out) {
+/* Is the last channel of a map alpha? Data and normals have none: their last channel is one of them. */
+static inline int txp_has_alpha(const texpatch_map *kind, const txm_image *im) {
+    return !kind->is_normal && !kind->is_data && txm_image_has_alpha(im);
+}
+
+/* The compared bytes of a pixel of one picture; returns how many. Colours are multiplied by alpha, so
+   that they count as much as they show. */
+static int txp_feature(const txm_image *im, double x, double y, int whole, int is_label,
+                       int has_alpha, double low, double high, double weight, uint8_t *out) {
     float v[4];
     if (whole) {
         for (int c = 0; c < im->channels; c++) v[c] = txm_image_get(im, (int)x, (int)y, c);
     } else {
-        txp_sample(im, x, y, is_label, v);
+        txp_sample(im, x, y, is_label, has_alpha, v);
     }
+    const int last = im->channels - 1;
+    const double alpha = has_alpha ? (double)txm_clampf(v[last], 0, 1) : 1;
     const double scale = high > low ? 255 / (high - low) * weight : 0;
     for (int c = 0; c < im->channels; c++) {
-        const double f = ((double)v[c] - low) * scale + 0.5;
+        const double f = has_alpha && c == last ? 255 * weight * alpha + 0.5
+                                                : ((double)v[c] - low) * scale * alpha + 0.5;
         out[c] = (uint8_t)(f < 0 ? 0 : f > 255 ? 255 : f);
     }
     return im->channels;
@@ -99,12 +160,13 @@ static void txp_features(const txp_setup *u, const txp_source *s, const txm_imag
     memset(out, 0, (size_t)s->bytes);
     for (int m = 0; m < u->map_count && maps; m++) {
         if (!(u->kinds[m].weight > 0)) continue;
-        n += txp_feature(&maps[m], x, y, whole, u->kinds[m].is_label, (double)u->low[m],
+        n += txp_feature(&maps[m], x, y, whole, u->kinds[m].is_label,
+                         txp_has_alpha(&u->kinds[m], &maps[m]), (double)u->low[m],
                          (double)u->high[m], (double)u->kinds[m].weight / most, out + n);
     }
     if (s->guide_bytes && guide)
-        txp_feature(guide, x, y, whole, 1, (double)u->guide_low, (double)u->guide_high,
-                    (double)u->guide_weight / most, out + s->guide_at);
+        txp_feature(guide, x, y, whole, 1, txm_image_has_alpha(guide), (double)u->guide_low,
+                    (double)u->guide_high, (double)u->guide_weight / most, out + s->guide_at);
 }
 
 /* Halve a level of the stack, sheet by sheet. */

@@ -192,6 +192,7 @@ check "amounts of 16 bits are averaged as they are" $check_patch half lod-height
 # a fence of thin wires; white is hidden between them
 $check_patch fence fence.png
 check "--lod of a cutout" run 0 fence.png -o fence-tile.png --size 91x64 --tileable-y --lod 4
+check "no hidden color shows" one_by_one $check_patch colored fence-tile{}.png 60,120,40 -- "" -1 -2 -3 -4
 check "--cutout" run 0 fence.png -o fence-cut.png --size 91x64 --tileable-y --lod 4 --cutout
 check "the picture itself is as without" cmp fence-tile.png fence-cut.png
 check "thin wires stay" one_by_one $check_patch covered fence-cut.png fence-cut{}.png 0.1 -- -1 -2 -3

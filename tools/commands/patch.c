@@ -94,6 +94,11 @@ static int make_picture(patch_job *j, char text[80]) {
     }
     for (int k = 0; k < d->map_count && result == TXM_OK; k++)
         result = texpatch_draw(made, k, 0, 0, env, j->out[k]);
+    for (int k = 0; k < d->map_count && result == TXM_OK; k++) {
+        const texpatch_map *kind = &j->maps[k];
+        if (!kind->is_label && !kind->is_normal && !kind->is_data)
+            result = txm_image_bleed(&j->out[k], d->tileable, env);
+    }
     for (int y = 0; y < d->height && result == TXM_OK && j->from; y++) {
         for (int x = 0; x < d->width; x++)
             j->from[(size_t)y * (size_t)d->width + (size_t)x] = texpatch_source_at(made, x, y);
