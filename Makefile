@@ -110,6 +110,7 @@ $(BUILD)/examples/%: examples/%/main.c $(BUILD)/files/stb.o $(SOURCES)
 	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
 
 $(BUILD)/examples/membrane: $(wildcard examples/membrane/*)
+$(BUILD)/examples/terrain: $(wildcard examples/terrain/*)
 $(BUILD)/examples/membrane: $(BUILD)/helpers/render.o $(MESHES) $(IMAGES)
 $(BUILD)/examples/repair: $(BUILD)/helpers/render.o $(MESHES) $(IMAGES)
 $(BUILD)/examples/join: $(IMAGES)
