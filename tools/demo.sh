@@ -163,12 +163,13 @@ repaired() {
     rm -rf "$out/$kind-steps"
     "$build/scan" "$kind" "$out/$kind" "$side" "$@"
     "$build/texkit" inpaint --mesh "$out/$kind.obj" --texture "$out/$kind.png" --mask "$out/$kind-mask.png" \
-        -o "$out/$kind-completed.png" --debug "$out/$kind-steps" --quiet
-    "$build/texkit" inpaint --mesh "$out/$kind.obj" --texture "$out/$kind.png" --mask "$out/$kind-mask.png" \
-        -o "$out/$kind-completed.png" --stats "$out/$kind.json" --quiet
+        -o "$out/$kind-completed.png" --debug "$out/$kind-steps" --stats "$out/$kind.json" --quiet
     total=$(seconds total "$out/$kind.json")
-    printf 'demo: %-8s %s texels completed in %4s s, %s lines continued\n' "$kind" \
-        "$(figure written "$out/$kind.json")" "$total" "$(figure joins "$out/$kind.json")"
+    # where copies alone fit best, no line is drawn in advance
+    joins=$(figure joins "$out/$kind.json") how="as texture"
+    [ "$joins" = 0 ] || how="$joins of $(figure line_ends "$out/$kind.json") line ends joined"
+    printf 'demo: %-8s %s texels completed in %4s s, %s\n' "$kind" \
+        "$(figure written "$out/$kind.json")" "$total" "$how"
     cat >>"$out/index.part" <<REPAIRED
 <h3>A $kind</h3>
 <p>$text</p>
@@ -573,7 +574,7 @@ if samples rock snow && [ -e "$out/lawn.png" ] && [ -x "$build/examples/terrain"
 <h3>Terrain</h3>
 <p>Heights and slopes say where lawn, rock and snow lie; 2048 &times; 2048 pixels of composite texture, learned
 from three photographs, <a href="terrain-map.png">cover it</a> without a repetition
-(<code>examples/terrain.c</code>).</p>
+(<code>examples/terrain</code>).</p>
 <img class="wide" src="terrain.png" width="1200" height="600" alt="mountains with meadows, rock and snow">
 TERRAIN
 fi
