@@ -15,7 +15,7 @@ function follow(file, i, n, names) {
 }
 FNR == 1 { file = name_of(FILENAME) }
 /^#include "/ { split($0, word, "\""); includes[file] = includes[file] " " name_of(word[2]) }
-/tk_(sweep|sweep_outputs|sweep_thinned|places|full)\(/ { sweeps[file] = 1 }
+/tk_(sweep|sweep_outputs|sweep_thinned|places|full|wide)\(/ { sweeps[file] = 1 }
 /^#define [A-Z_]*_IMPLEMENTATION/ {
     sub(/_IMPLEMENTATION.*/, "", $2)
     holds[file, tolower($2)] = 1
@@ -32,7 +32,7 @@ END {
                 objects = objects " " root "/modules/" module[i] ".o"
         if ("image_io.h" in seen || "mesh_io.h" in seen || "mesh_file.h" in seen) objects = objects " " files
         more = file in sweeps
-        for (name in seen) more = more || (name in sweeps && name != "faults.h")
+        for (name in seen) more = more || (name in sweeps && name !~ /^(faults|testkit)\.h$/)
         if (more) sweeping = sweeping " " substr(file, 1, length(file) - 2)
         print root "/unit/" substr(file, 1, length(file) - 2) ":" objects
     }

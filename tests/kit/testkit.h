@@ -10,6 +10,12 @@
 #include "faults.h"
 #include "threads.h"
 
+/* First in a test that takes long and tries what shorter ones try as well: it is left to `make check`. */
+#define tk_wide() \
+    do { \
+        if (!tk_full()) skip(); \
+    } while (0)
+
 /* ---- comparing -------------------------------------------------------------------------- */
 
 /* FNV-1a over bytes: one number that stands for a whole output; chain by passing the last one

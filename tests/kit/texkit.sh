@@ -8,7 +8,7 @@ prefix=
 run() {
     want=$1
     shift
-    before=$(all_files)
+    [ "$want" = 0 ] || before=$(all_files)
     "$texkit" ${prefix:+"$prefix"} "$@" >out.log 2>err.log
     got=$?
     [ $got = "$want" ] || { echo "status $got instead of $want"; cat err.log; return 1; }

@@ -122,6 +122,7 @@ static void test_disturb(void **state) {
 /* Strokes as people draw them: corners, hairpins, knots, out of the picture, tiny, crossing. */
 static void test_disturb_anything(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t guide[200 * 160], mask[200 * 160];
     static txm_vec2 points[200];
     texedges_set *blobs = find_blobs(2, 0.5);
@@ -359,6 +360,7 @@ static double chi_square(const double *a, const double *b) {
    are found in the guide. */
 static void test_statistics(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t guide[WIDE * WIDE], mask[WIDE * WIDE];
     static double x[40000], y[40000];
     for (int round = 0; round < 3; round++) {

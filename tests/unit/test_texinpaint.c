@@ -192,6 +192,7 @@ static void test_maps_in_register(void **state) {
 /* Rings, and normals that point away from their centre: also where pieces are turned or mirrored. */
 static void test_normals_turn(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t normal[3 * PIXELS], normal_out[3 * PIXELS];
     texinpaint_map map;
     memset(&map, 0, sizeof map);
@@ -309,6 +310,7 @@ static texinpaint_desc plane_desc(double radius) {
 
 static void test_same_bytes_for_any_threads(void **state) {
     (void)state;
+    tk_wide();
     static int counts[3] = {1, 2, 3};
     for (int k = 0; k < 8; k++) {
         texinpaint_desc d = desc_of(picture, 3, TXM_U8);
@@ -571,6 +573,7 @@ static void test_strange_meshes(void **state) {
 /* Holes are counted on the surface: one goes through the seam, one is by itself. */
 static void test_holes_are_counted(void **state) {
     (void)state;
+    tk_wide();
     texinpaint_job *job = NULL;
     texinpaint_desc d = plane_desc(7);
     add_disk(7, 7, 3);

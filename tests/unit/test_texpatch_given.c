@@ -143,6 +143,7 @@ static void test_keep(void **state) {
 
 static void test_exemplars(void **state) {
     (void)state;
+    tk_wide();
     enum { SIDE = 128 };
     txm_image maps[3];
     texpatch_exemplar e[3];

@@ -81,6 +81,7 @@ static void test_turns(void **state) {
 /* The sample type changes nothing but the samples. */
 static void test_samples(void **state) {
     (void)state;
+    tk_wide();
     for (int channels = 1; channels <= 4; channels++) {
         txm_image forms[4];
         const texpatch_source *first = NULL;
@@ -137,6 +138,7 @@ static void test_samples(void **state) {
 /* Unusual sizes and strides. */
 static void test_sizes(void **state) {
     (void)state;
+    tk_wide();
     static const int sizes[6][2] = {{1, 1}, {1, 300}, {300, 1}, {33, 97}, {2, 2}, {131, 67}};
     const txm_image gravel = draw_gravel(37, 53, 3, 0), turned = flipped(&gravel);
     const texpatch_exemplar e = exemplar_of(&gravel), f = exemplar_of(&turned);
@@ -166,6 +168,7 @@ static void test_sizes(void **state) {
 
 static void test_seeds_and_threads(void **state) {
     (void)state;
+    tk_wide();
     const txm_image gravel = draw_gravel(96, 96, 3, 0), bricks = draw_bricks(96, 96, 24, 16);
     for (int which = 0; which < 2; which++) {
         const texpatch_exemplar e = exemplar_of(which ? &bricks : &gravel);

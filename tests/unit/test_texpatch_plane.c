@@ -17,6 +17,7 @@ static texpatch_plane *plane_of(const texpatch_desc *desc) {
 
 static void test_plane_windows(void **state) {
     (void)state;
+    tk_wide();
     enum { COUNT = 20 };
     const int windows[5] = {2, 3, tk_full() ? COUNT : 8, 3, 3};
     txm_image maps[2];

@@ -8,6 +8,7 @@
 
 static void test_synth_sizes(void **state) {
     (void)state;
+    tk_wide();
     static const int sizes[][2] = {{1, 1},  {2, 2},   {1, 200}, {200, 1}, {17, 33},
                                    {3, 64}, {64, 65}, {7, 129}, {700, 300}};
     static uint8_t out[700 * 300 * 3 + 64];
@@ -93,6 +94,7 @@ static void run_with(txm_env *env, saved *s, uint8_t *out) {
 
 static void test_same_bytes(void **state) {
     (void)state;
+    tk_wide();
     enum { BYTES = 90 * 200 * 3 };
     static saved s[4];
     static uint8_t out[4][BYTES];

@@ -56,6 +56,7 @@ static void test_layout_is_used(void **state) {
 /* The same with 16 bits and as floats, bottom-up; gray into RGB and RGBA. */
 static void test_formats(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t bytes[40 * 30], wide[40 * 30 * 4];
     static uint16_t words[40 * 30];
     static float floats[40 * 30];
@@ -100,6 +101,7 @@ static void test_alpha(void **state) {
 
 static void test_threads(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t map[SIDE * SIDE], pixels[MOST], first[MOST], out[MOST];
     draw_labels(map, SIDE, SIDE, patches);
     draw_parts(pixels, map, SIDE, SIDE, 3);
@@ -126,6 +128,7 @@ static void test_threads(void **state) {
 
 static void test_save_and_load(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t bytes[1 << 16], again[1 << 16], out[2][40 * 30 * 4];
     for (int channels = 1; channels <= 4; channels += channels == 1 ? 2 : 1) {
         texsyn_composite *c = small_composite(channels), *loaded = NULL;

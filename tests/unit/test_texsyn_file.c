@@ -186,6 +186,7 @@ static void test_load_first_version(void **state) {
 /* With a repaired checksum the bytes may be anything: they are refused, or a model that works. */
 static void test_load_mutated(void **state) {
     (void)state;
+    tk_wide();
     static saved s, again;
     static uint8_t bytes[1 << 15], out[32 * 32 * 4];
     enum { SYNTHESES = 4 }; /* one in so many that load synthesises */

@@ -214,6 +214,7 @@ static void test_source(void **state) {
 
 static void test_model(void **state) {
     (void)state;
+    tk_wide();
     for (int channels = 1; channels <= 4; channels += channels == 1 ? 2 : 1) {
         static uint8_t image[MOST], mask[SIDE * SIDE], out[MOST];
         texsyn_model *model = small_model(channels, 3);

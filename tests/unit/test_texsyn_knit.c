@@ -126,6 +126,7 @@ static void check_shape(shape *is_b, int channels, float roughness, texsyn_liken
 
 static void test_outside(void **state) {
     (void)state;
+    tk_wide();
     for (int i = 0; i < SHAPES; i++) check_shape(shapes[i], 3, 3.0f, TEXSYN_LIKENESS_DIFFERENT);
     check_shape(wave, 1, 2.0f, TEXSYN_LIKENESS_DIFFERENT);
     check_shape(island, 4, 2.0f, TEXSYN_LIKENESS_DIFFERENT);
@@ -366,6 +367,7 @@ static void test_long(void **state) {
 /* Order of tasks, threads and buffers make no difference; seeds do. */
 static void test_same_bytes(void **state) {
     (void)state;
+    tk_wide();
     texsyn_knit_desc d = two(3, wave);
     for (int alike = 0; alike < 2; alike++) {
         d.likeness = alike ? TEXSYN_LIKENESS_SAME : TEXSYN_LIKENESS_DIFFERENT;

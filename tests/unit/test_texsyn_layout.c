@@ -52,16 +52,19 @@ static void check_alike(label_at *label, int labels) {
 
 static void test_patches(void **state) {
     (void)state;
+    tk_wide();
     check_alike(patches, 2);
 }
 
 static void test_three(void **state) {
     (void)state;
+    tk_wide();
     check_alike(three, 3);
 }
 
 static void test_stripes(void **state) {
     (void)state;
+    tk_wide();
     check_alike(stripes, 2);
 }
 
@@ -81,6 +84,7 @@ static double first_third(const uint8_t *map, int width, int height, int is_rows
 
 static void test_sky(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t example[LARGE * LARGE], turned[LARGE * LARGE], made[LARGE * LARGE * 2];
     static const int sizes[3][2] = {{LARGE, LARGE}, {LARGE * 2, LARGE}, {60, 40}};
     draw_labels(example, LARGE, LARGE, sky);

@@ -119,6 +119,7 @@ static double what_is_left(const light *l, int like_offset, double split, double
 /* The same picture, then the same materials in other patches: the light is undone. */
 static void test_lights_are_undone(void **state) {
     (void)state;
+    tk_wide();
     for (int offset = 0; offset <= 100; offset += 100) {
         double mean = 0, most = 0;
         for (int i = 0; i < LIGHT_COUNT; i++) {
@@ -306,6 +307,7 @@ static void test_channels(void **state) {
 /* One colour only, black, white, floats far beyond 1: numbers stay finite. */
 static void test_plain_pictures(void **state) {
     (void)state;
+    tk_wide();
     static float image[COUNT * 3], like[COUNT * 3], out[COUNT * 3];
     static const float values[6] = {0, 1, 0.5f, 1e6f, -1e6f, 1e-6f};
     texsyn_relight_desc d;

@@ -57,6 +57,7 @@ static void test_mosaics(void **state) {
 
 static void test_single_textures(void **state) {
     (void)state;
+    tk_wide();
     for (int t = 0; t < MOSAIC_TEXTURES; t++) {
         for (int i = 0; i < PIXELS; i++) mosaic_texel(t, i % SIDE, i / SIDE, pixels + 3 * i);
         const texsyn_segment_desc d = segment_desc(view_bytes(pixels, SIDE, SIDE, 3));
@@ -77,6 +78,7 @@ static double agreement(const uint8_t *a, const uint8_t *b, int count) {
 
 static void test_turned_and_brighter(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t turned[PIXELS * 3], back[PIXELS];
     draw_mosaic(pixels, truth, SIDE, 3, 5);
     texsyn_segment_desc d = segment_desc(view_bytes(pixels, SIDE, SIDE, 3));
@@ -94,6 +96,7 @@ static void test_turned_and_brighter(void **state) {
 
 static void test_forced(void **state) {
     (void)state;
+    tk_wide();
     draw_mosaic(pixels, truth, SIDE, 4, 3);
     texsyn_segment_desc d = segment_desc(view_bytes(pixels, SIDE, SIDE, 3));
     for (int k = 1; k <= TEXSYN_MAX_SEGMENTS; k += k < 4 || tk_full() ? 1 : 6) {
@@ -135,6 +138,7 @@ static void test_masks_and_alpha(void **state) {
 
 static void test_formats(void **state) {
     (void)state;
+    tk_wide();
     static uint16_t words[PIXELS * 3];
     static float floats[PIXELS * 3];
     static uint8_t upside_down[PIXELS * 3];
@@ -164,6 +168,7 @@ static void test_formats(void **state) {
 
 static void test_sizes(void **state) {
     (void)state;
+    tk_wide();
     static const int sizes[][2] = {{16, 16}, {17, 33}, {16, 4000},
                                    {9000, 16}, {130, 31}, {1000, 800}};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
@@ -203,6 +208,7 @@ static void test_transition(void **state) {
 
 static void test_threads(void **state) {
     (void)state;
+    tk_wide();
     draw_mosaic(pixels, truth, SIDE, 4, 9);
     texsyn_segment_desc d = segment_desc(view_bytes(pixels, SIDE, SIDE, 3));
     d.transition = 1;

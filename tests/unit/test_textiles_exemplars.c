@@ -11,6 +11,7 @@
 /* 8 bits made 16: the same tiles. (Those of triangles are resampled, to 16 bits.) */
 static void test_sixteen_bits(void **state) {
     (void)state;
+    tk_wide();
     enum { N = 96 };
     txm_image maps[2] = {draw(BLOBS, N, N, 3, 64), new_image(N, N, 3, TXM_U16)};
     for (int i = 0; i < N * N * 3; i++)
@@ -119,6 +120,7 @@ static void try_size(textiles_kind kind, int width, int height, int channels, in
 
 static void test_sizes(void **state) {
     (void)state;
+    tk_wide();
     try_size(TEXTILES_WANG, 64, 64, 1, 32, 4, 1);
     try_size(TEXTILES_WANG, 100, 64, 4, 33, 2, 1);
     try_size(TEXTILES_CORNER, 64, 64, 1, 32, 3, 1);
@@ -129,6 +131,7 @@ static void test_sizes(void **state) {
 
 static void test_small_exemplars(void **state) {
     (void)state;
+    tk_wide();
     try_size(TEXTILES_FRAME, 400, 64, 1, 0, 1, 6);
     if (tk_full()) {
         try_size(TEXTILES_FRAME, 64, 64, 3, 0, 2, 6);

@@ -243,6 +243,7 @@ static void test_failing(void **state) {
 /* The head comment says how much memory making a set takes. */
 static void test_peak_memory(void **state) {
     (void)state;
+    tk_wide();
     static const int cases[][2] = {{32, 256}, {100, 64}}; /* tile, exemplar */
     for (int i = 0; i < 2; i++) {
         const int size = cases[i][0], n = cases[i][1];

@@ -366,5 +366,5 @@ int main(void) {
         cmocka_unit_test(test_import_beyond_triangles),
         cmocka_unit_test(test_import_refuses),
     };
-    return cmocka_run_group_tests_name("textiles_set", tests, make_common, free_common);
+    return cmocka_run_group_tests_name("textiles_set", tests, make_common_unrepaired, free_common);
 }

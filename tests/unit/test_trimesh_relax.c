@@ -65,6 +65,7 @@ static void test_ball(void **state) {
 
 static void test_torus(void **state) {
     (void)state;
+    tk_wide();
     make_torus(60, 28);
     for (int k = 0; k < 2; k++) {
         const trimesh_desc d = describe(3001, both[k]);
@@ -215,6 +216,7 @@ static double off_outline(const float *p, int n) {
 
 /* The border keeps its loops, its corners and its place. */
 static void test_border(void **state) {
+    tk_wide();
     enum { SIDE = 30 };
     static const size_t numbers[] = {40, 601, 2000};
     (void)state;
@@ -358,6 +360,7 @@ static double edges_beyond(const trimesh_mesh *m, float x) {
 }
 
 static void test_scale(void **state) {
+    tk_wide();
     static const float factors[] = {2, 4};
     (void)state;
     make_ball(24);
@@ -559,6 +562,7 @@ static void try_small(size_t vertices, trimesh_method method) {
 
 static void test_too_small(void **state) {
     (void)state;
+    tk_wide();
     for (int k = 0; k < 2; k++) {
         char message[sizeof(((txm_env *)0)->message)];
         make_cube();
@@ -706,6 +710,7 @@ static uint64_t hash_of(const trimesh_desc *d, txm_env *env) {
 
 static void test_same_bytes(void **state) {
     (void)state;
+    tk_wide();
     for (int which = 0; which < 2; which++) {
         if (which) make_sheet(20);
         else make_torus(40, 20);
