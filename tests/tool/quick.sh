@@ -5,7 +5,7 @@
 . tests/kit/texkit.sh
 
 root=$(pwd)
-texkit=$root/build/texkit
+texkit=$root/$OUT/asan/texkit # with the sanitizers
 python=/usr/bin/python3
 check_tool() { # NAME ARGUMENTS...: tests/tool/check_NAME.py
     name=$1
