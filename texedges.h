@@ -167,7 +167,8 @@ typedef struct texedges_set {
 /* What to find. All zero but the image is a good default. */
 typedef struct texedges_desc {
     txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
-                        samples as they are, clamped to 0..1; alpha is not used                */
+                        samples as they are, clamped to 0..1; alpha is not used, but where it
+                        is 0 the colour is taken from visible neighbours                       */
     int levels;      /* 2..TEXEDGES_MAX_LEVELS; 0 = 4, as in the paper                         */
     float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
                         1 to 3                                                                 */
@@ -731,9 +732,11 @@ static txm_status txe_layers_find(const texedges_desc *desc, int levels, int is_
     const double smooth = desc->smooth;
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
-    if (arena->failed) return txe_no_memory(env);
+    txm_image shown; /* hidden colours are those of visible neighbours */
+    if (arena->failed || txm_image_bled(&desc->image, 0, arena, env, &shown) != TXM_OK)
+        return txe_no_memory(env);
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
-    const int good = txe_gray(&desc->image, gray, bar);
+    const int good = txe_gray(&shown, gray, bar);
     if (good < 0)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is not finite");
     if (!good || (smooth > 0 && !txe_blur(gray, scratch, width, height, smooth, bar)) ||

@@ -239,6 +239,10 @@ typedef struct textiles_desc {
                      show, colors entries; NULL = any                                            */
     textiles_repair repair;
     uint64_t seed; /* another seed gives another set                                             */
+    unsigned data_maps; /* sum of 1 << m: map m holds data; else the last of 2 or 4 channels is
+                     alpha, which says how much of the others shows: they are compared, averaged and
+                     repaired weighted by it, and those of fully transparent pixels become those of
+                     visible neighbours                                                          */
 } textiles_desc;
 
 /* A set of tiles; never changed after it is made. */
@@ -256,7 +260,7 @@ typedef struct textiles_set textiles_set;
 TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, textiles_set **out);
 
 /* Make a set of finished pictures, for example hand-made ones; all functions below work for it too.
-   Of desc only kind, size, colors, variants, reduced and classes are read. tiles holds the pictures
+   Of desc only kind, size, colors, variants, reduced, classes and data_maps are read. tiles holds the pictures
    of map_count maps tile by tile, tiles[tile * map_count + map], in the order of textiles_tile_at:
    size x size, of a triangle (size + 1) x (size + 1) with texel (i, j) at column i, row j; texels
    beyond i + j = size are ignored. tile_count must be the number of tiles that such a set has. */
@@ -393,7 +397,8 @@ TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int
    is none, by the symbols (2 color + (direction < 0)) of sides 0, 1, 2 as digits. NULL for squares. */
 TEXTILES_API const int32_t *textiles_plane_table(const textiles_plane *plane, int *count);
 
-/* Draw a window of the plane from an atlas, with bilinear filtering, as shaders/textiles.glsl does.
+/* Draw a window of the plane from an atlas, with bilinear filtering, as shaders/textiles.glsl does;
+   in an atlas of 2 or 4 channels colour is weighted by alpha.
 
    atlas   drawn by textiles_draw_atlas with this layout
    x, y    position of the picture's top left corner on the plane, in pixels of the tiles (a side of
@@ -494,6 +499,7 @@ TEXTILES_API int textiles_face_uv(const textiles_layout *layout, int tile, int r
 /* One map of all tiles: tile by tile side x side texels. */
 typedef struct txt_map {
     int channels;
+    int has_alpha;   /* the last of 2 or 4 channels is alpha: the map is no data */
     txm_sample sample;
     size_t texel;    /* bytes of one texel                                     */
     uint8_t *pixels; /* count * side * side * texel bytes; aligned for sample  */
@@ -672,7 +678,7 @@ static void txt_list_tiles(textiles_set *s, const textiles_desc *d) {
 }
 
 /* A set with its tiles listed and memory for their texels. Of maps only channels and sample are
-   read. */
+   read, and what is alpha follows from the description. */
 static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int map_count,
                                int with_source, txm_env *env, textiles_set **out) {
     textiles_set head;
@@ -699,6 +705,7 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     head.lookup = (int32_t *)txm_arena_alloc(&head.arena, codes, sizeof(int32_t));
     for (int m = 0; m < map_count; m++) {
         head.maps[m] = maps[m];
+        head.maps[m].has_alpha = maps[m].channels % 2 == 0 && !(d->data_maps >> m & 1);
         head.maps[m].texel = (size_t)maps[m].channels * txm_sample_bytes(maps[m].sample);
         head.maps[m].pixels = (uint8_t *)txm_arena_zero(&head.arena, all, head.maps[m].texel);
     }
@@ -734,6 +741,19 @@ static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
         if (!txm_image_is_finite(&row)) return 0;
     }
     return 1;
+}
+
+/* Replace the hidden colours of all tiles of imported squares by those of visible neighbours. */
+static txm_status txt_bleed_tiles(const textiles_set *s, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int i = 0; i < s->count && s->kind != TEXTILES_TRIANGLE; i++) {
+        for (int m = 0; m < s->map_count && status == TXM_OK; m++) {
+            const txm_image tile = {txt_texel(s, m, i, 0, 0), s->side, s->side,
+                                    s->maps[m].channels, s->maps[m].sample, 0};
+            if (s->maps[m].has_alpha) status = txm_image_bleed(&tile, 0, env);
+        }
+    }
+    return status;
 }
 
 /* ---- public: sets ------------------------------------------------------------------------- */
@@ -792,8 +812,10 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
                        (size_t)side * s->maps[m].texel);
         }
     }
-    *out = s;
-    return TXM_OK;
+    status = txt_bleed_tiles(s, env);
+    if (status != TXM_OK) textiles_set_free(s);
+    else *out = s;
+    return status;
 }
 
 TEXTILES_API textiles_kind textiles_kind_of(const textiles_set *set) {
@@ -2281,10 +2303,20 @@ static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *
         at[k] = (size_t)txm_clampi(ix, 0, l->width - 1) * (size_t)v->atlas.channels;
         rows[k] = txm_image_row_const(&v->atlas, txm_clampi(iy, top, bottom));
     }
-    for (int c = 0; c < v->atlas.channels; c++) {
+    const int last = v->atlas.channels - 1, has_alpha = txm_image_has_alpha(&v->atlas);
+    double alpha[4] = {1, 1, 1, 1}, shown = 0;
+    for (int k = 0; k < 4 && has_alpha; k++) {
+        alpha[k] = fmax(txt_stored(v->atlas.sample, rows[k / 2], at[k & 1] + (size_t)last), 0);
+        shown += alpha[k] * (k & 1 ? fx : 1 - fx) * (k / 2 ? fy : 1 - fy);
+    }
+    const int is_even = alpha[0] == alpha[1] && alpha[0] == alpha[2] && alpha[0] == alpha[3];
+    for (int c = 0; c <= last; c++) {
         double s[4];
-        for (int k = 0; k < 4; k++)
+        const int by_alpha = c < last && !is_even && shown > 0;
+        for (int k = 0; k < 4; k++) {
             s[k] = txt_stored(v->atlas.sample, rows[k / 2], at[k & 1] + (size_t)c);
+            if (by_alpha) s[k] *= alpha[k] / shown;
+        }
         const double above = s[0] * (1 - fx) + s[1] * fx, below = s[2] * (1 - fx) + s[3] * fx;
         const double value = above * (1 - fy) + below * fy;
         if (v->atlas.sample == TXM_F32) ((float *)to)[c] = txm_float(value);
@@ -2636,8 +2668,21 @@ static double txt_keys(double x) {
     return 0;
 }
 
-/* One row of a lattice sheet: interpolate six rows of the picture, then along the row. */
-static void txt_resample_row(const txm_image *in, const txm_image *out, int row, double *line) {
+/* Is a pixel of an image with alpha not fully opaque? */
+static int txt_is_translucent(const txm_image *im) {
+    for (int y = 0; y < im->height; y++) {
+        for (int x = 0; x < im->width; x++) {
+            if (txm_image_get(im, x, y, im->channels - 1) < 1) return 1;
+        }
+    }
+    return 0;
+}
+
+/* One row of a lattice sheet: interpolate six rows of the picture, then along the row. by_alpha:
+   colours are weighted by alpha; where so little shows that the weights below 0 count, they are
+   those of the nearest pixel. */
+static void txt_resample_row(const txm_image *in, const txm_image *out, int row, int by_alpha,
+                             double *line) {
     const double y = row * 0.86602540378443864676;
     const int top = (int)floor(y), n = in->channels;
     double weight[6], half[6];
@@ -2648,20 +2693,29 @@ static void txt_resample_row(const txm_image *in, const txm_image *out, int row,
     for (int x = 0; x < in->width; x++) {
         for (int c = 0; c < n; c++) {
             double sum = 0;
-            for (int k = 0; k < 6; k++)
-                sum += weight[k] *
-                       txm_image_get(in, x, txm_clampi(top - 2 + k, 0, in->height - 1), c);
+            for (int k = 0; k < 6; k++) {
+                const int v = txm_clampi(top - 2 + k, 0, in->height - 1);
+                double value = txm_image_get(in, x, v, c);
+                if (by_alpha && c + 1 < n)
+                    value *= (double)txm_clampf(txm_image_get(in, x, v, n - 1), 0, 1);
+                sum += weight[k] * value;
+            }
             line[x * n + c] = sum;
         }
     }
+    const int nearest = txm_clampi((int)floor(y + 0.5), 0, in->height - 1);
     for (int x = 0; x < out->width; x++) {
-        for (int c = 0; c < n; c++) {
+        double shown = 1;
+        for (int c = n - 1; c >= 0; c--) { /* alpha first */
             double value = line[x * n + c];
             if (row & 1) {
                 value = 0;
                 for (int k = 0; k < 6; k++)
                     value += half[k] * line[txm_clampi(x - 2 + k, 0, in->width - 1) * n + c];
             }
+            if (by_alpha && c == n - 1) shown = value;
+            else if (by_alpha && shown > 0.25) value /= shown;
+            else if (by_alpha) value = txm_image_get(in, x, nearest, c);
             txm_image_set(out, x, row, c, txm_float(value));
         }
     }
@@ -2685,9 +2739,14 @@ static txm_status txt_make_sheets(txt_build *b) {
         if (b->texels > TEXTILES_MAX_PIXELS)
             return txm_fail(b->env, TXM_TOO_LARGE, "exemplars: more than TEXTILES_MAX_PIXELS");
         for (int m = 0; m < b->set->map_count; m++) {
-            const txm_image in = txm_image_resolve(d->exemplars[e].maps[m]);
+            txm_image in = txm_image_resolve(d->exemplars[e].maps[m]);
+            const int has_alpha = b->set->maps[m].has_alpha;
+            const txm_status status =
+                has_alpha ? txm_image_bled(&in, 0, &b->arena, b->env, &in) : TXM_OK;
+            if (status != TXM_OK) return status;
             s->maps[m] = in;
             if (!b->is_triangle) continue;
+            const int by_alpha = has_alpha && txt_is_translucent(&in);
             txm_image *out = &s->maps[m];
             out->width = s->width;
             out->height = s->height;
@@ -2699,7 +2758,7 @@ static txm_status txt_make_sheets(txt_build *b) {
                 txm_free(b->env, line);
                 return txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
             }
-            for (int y = 0; y < s->height; y++) txt_resample_row(&in, out, y, line);
+            for (int y = 0; y < s->height; y++) txt_resample_row(&in, out, y, by_alpha, line);
             txm_free(b->env, line);
         }
         b->set->sheets[e].first = s->first;
@@ -2798,7 +2857,7 @@ static txm_status txt_fill_features(txt_build *b) {
             for (int y = 0; y < im->height; y++) {
                 for (int x = 0; x < im->width; x++, to += b->stride) {
                     double v = (txm_image_get(im, x, y, c) - low) * scale;
-                    if (n % 2 == 0 && c + 1 < n)
+                    if (b->set->maps[m].has_alpha && c + 1 < n)
                         v *= txm_clampf(txm_image_get(im, x, y, n - 1), 0, 1);
                     *to = (uint8_t)txm_clampi((int)(v + 0.5), 0, 255);
                 }
@@ -4500,6 +4559,9 @@ static void txt_cut_tile(txt_canvas *c) {
 
 /* ---- repair ------------------------------------------------------------------------------ */
 
+#define TXT_FAINT 0.125 /* alpha up to which a repaired colour says too little, and ...            */
+#define TXT_CLEAR 0.5   /* ... from which on it is taken as it is                                  */
+
 /* Memory for txm_poisson from one block, so that threads do not call the allocator. */
 typedef struct txt_pool {
     uint8_t *block;
@@ -4530,6 +4592,30 @@ static float txt_sheet_value(const txt_build *b, int map, int32_t t, int channel
     const txt_sheet *s = &b->sheets[txt_sheet_of(b->set, t)];
     const int at = t - s->first;
     return txm_image_get(&s->maps[map], at % s->width, at / s->width, channel);
+}
+
+/* The same as it is repaired: colours as much as they show. */
+static float txt_repair_value(const txt_build *b, int map, int32_t t, int channel) {
+    const int last = b->set->maps[map].channels - 1;
+    const float value = txt_sheet_value(b, map, t, channel);
+    if (!b->set->maps[map].has_alpha || channel == last) return value;
+    const float alpha = txm_clampf(txt_sheet_value(b, map, t, last), 0, 1);
+    return txm_float((double)value * (double)alpha);
+}
+
+/* The straight colour and the alpha of a repaired texel. Opaque texels stay opaque and transparent
+   ones transparent; the less shows, the more the colour is that of the exemplar. */
+static void txt_repair_shown(const txt_build *b, int map, int32_t t, float *pixel) {
+    const int last = b->set->maps[map].channels - 1;
+    const double alpha = (double)txm_clampf(txt_sheet_value(b, map, t, last), 0, 1);
+    const double shown = (double)pixel[last], least = shown < alpha ? shown : alpha;
+    const double trust = (least - TXT_FAINT) / (TXT_CLEAR - TXT_FAINT);
+    for (int c = 0; c < last; c++) {
+        const float own = txt_sheet_value(b, map, t, c);
+        const float repaired = trust > 0 ? txm_float((double)pixel[c] / shown) : own;
+        pixel[c] = trust >= 1 ? repaired : txm_lerpf(own, repaired, txm_float(trust > 0 ? trust : 0));
+    }
+    pixel[last] = txm_float(alpha + (shown - alpha) * 4 * alpha * (1 - alpha));
 }
 
 typedef struct txt_repair {
@@ -4564,7 +4650,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
     }
     if (!any) return;
     for (int m = 0; m < set->map_count; m++) {
-        const int n = set->maps[m].channels;
+        const int n = set->maps[m].channels, has_alpha = set->maps[m].has_alpha;
         txm_poisson_desc desc;
         txm_env env;
         memset(&desc, 0, sizeof desc);
@@ -4575,7 +4661,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
         r->pool.used = 0;
         for (int p = 0; p < side * side; p++) {
             for (int k = 0; k < n; k++) {
-                r->image[p * n + k] = c->inside[p] ? txt_sheet_value(b, m, c->shows[p], k) : 0.0f;
+                r->image[p * n + k] = c->inside[p] ? txt_repair_value(b, m, c->shows[p], k) : 0.0f;
                 r->target[p * n + k] = 0;
             }
         }
@@ -4592,11 +4678,11 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
                         const double here = r->image[p * n + k], there = r->image[q * n + k];
                         double sum = 0, count = 0;
                         if (pq >= 0) {
-                            sum += txt_sheet_value(b, m, pq, k) - here;
+                            sum += txt_repair_value(b, m, pq, k) - here;
                             count += 1;
                         }
                         if (qp >= 0) {
-                            sum += there - txt_sheet_value(b, m, qp, k);
+                            sum += there - txt_repair_value(b, m, qp, k);
                             count += 1;
                         }
                         const double step = count > 0 ? sum / count : there - here;
@@ -4620,6 +4706,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
         const txm_image out = {txt_texel(set, m, c->tile, 0, 0), side, side, n,
                                set->maps[m].sample, 0};
         for (int p = 0; p < side * side; p++) {
+            if (r->mask[p] && has_alpha) txt_repair_shown(b, m, c->shows[p], r->image + p * n);
             for (int k = 0; k < n && r->mask[p]; k++)
                 txm_image_set(&out, p % side, p / side, k, r->image[p * n + k]);
         }
@@ -4901,11 +4988,20 @@ TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, t
 
 /* ---- public: measuring ------------------------------------------------------------------- */
 
-/* sum over the channels of the absolute difference of two texels */
+/* sum over the channels of the absolute difference of two texels; colours count as they show */
 static double txt_texel_step(const txt_map *m, const uint8_t *p, const uint8_t *q) {
-    double sum = 0;
-    for (size_t c = 0; c < (size_t)m->channels; c++)
-        sum += fabs(txt_stored(m->sample, p, c) - txt_stored(m->sample, q, c));
+    const size_t last = (size_t)m->channels - 1;
+    const double full = m->sample == TXM_F32 ? 1 : m->sample == TXM_U16 ? 65535 : 255;
+    double sum = 0, shown_p = 1, shown_q = 1;
+    if (m->has_alpha) {
+        shown_p = fmin(fmax(txt_stored(m->sample, p, last) / full, 0), 1);
+        shown_q = fmin(fmax(txt_stored(m->sample, q, last) / full, 0), 1);
+    }
+    for (size_t c = 0; c <= last; c++) {
+        const int is_alpha = m->has_alpha && c == last;
+        sum += fabs(txt_stored(m->sample, p, c) * (is_alpha ? 1 : shown_p) -
+                    txt_stored(m->sample, q, c) * (is_alpha ? 1 : shown_q));
+    }
     return sum;
 }
 

@@ -167,7 +167,8 @@ typedef struct texedges_set {
 /* What to find. All zero but the image is a good default. */
 typedef struct texedges_desc {
     txm_image image; /* 1..4 channels; the gray is the luma of RGB (0.2126, 0.7152, 0.0722) of the
-                        samples as they are, clamped to 0..1; alpha is not used                */
+                        samples as they are, clamped to 0..1; alpha is not used, but where it
+                        is 0 the colour is taken from visible neighbours                       */
     int levels;      /* 2..TEXEDGES_MAX_LEVELS; 0 = 4, as in the paper                         */
     float smooth;    /* radius in pixels of a blur beforehand, 0..16; a fine-grained picture needs
                         1 to 3                                                                 */

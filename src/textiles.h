@@ -239,6 +239,10 @@ typedef struct textiles_desc {
                      show, colors entries; NULL = any                                            */
     textiles_repair repair;
     uint64_t seed; /* another seed gives another set                                             */
+    unsigned data_maps; /* sum of 1 << m: map m holds data; else the last of 2 or 4 channels is
+                     alpha, which says how much of the others shows: they are compared, averaged and
+                     repaired weighted by it, and those of fully transparent pixels become those of
+                     visible neighbours                                                          */
 } textiles_desc;
 
 /* A set of tiles; never changed after it is made. */
@@ -256,7 +260,7 @@ typedef struct textiles_set textiles_set;
 TEXTILES_API txm_status textiles_make(const textiles_desc *desc, txm_env *env, textiles_set **out);
 
 /* Make a set of finished pictures, for example hand-made ones; all functions below work for it too.
-   Of desc only kind, size, colors, variants, reduced and classes are read. tiles holds the pictures
+   Of desc only kind, size, colors, variants, reduced, classes and data_maps are read. tiles holds the pictures
    of map_count maps tile by tile, tiles[tile * map_count + map], in the order of textiles_tile_at:
    size x size, of a triangle (size + 1) x (size + 1) with texel (i, j) at column i, row j; texels
    beyond i + j = size are ignored. tile_count must be the number of tiles that such a set has. */
@@ -393,7 +397,8 @@ TEXTILES_API int textiles_plane_triangle(const textiles_plane *plane, int a, int
    is none, by the symbols (2 color + (direction < 0)) of sides 0, 1, 2 as digits. NULL for squares. */
 TEXTILES_API const int32_t *textiles_plane_table(const textiles_plane *plane, int *count);
 
-/* Draw a window of the plane from an atlas, with bilinear filtering, as shaders/textiles.glsl does.
+/* Draw a window of the plane from an atlas, with bilinear filtering, as shaders/textiles.glsl does;
+   in an atlas of 2 or 4 channels colour is weighted by alpha.
 
    atlas   drawn by textiles_draw_atlas with this layout
    x, y    position of the picture's top left corner on the plane, in pixels of the tiles (a side of

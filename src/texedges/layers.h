@@ -244,9 +244,11 @@ static txm_status txe_layers_find(const texedges_desc *desc, int levels, int is_
     const double smooth = desc->smooth;
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
-    if (arena->failed) return txe_no_memory(env);
+    txm_image shown; /* hidden colours are those of visible neighbours */
+    if (arena->failed || txm_image_bled(&desc->image, 0, arena, env, &shown) != TXM_OK)
+        return txe_no_memory(env);
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
-    const int good = txe_gray(&desc->image, gray, bar);
+    const int good = txe_gray(&shown, gray, bar);
     if (good < 0)
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a sample is not finite");
     if (!good || (smooth > 0 && !txe_blur(gray, scratch, width, height, smooth, bar)) ||

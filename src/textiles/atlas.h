@@ -309,10 +309,20 @@ static void txt_bilinear(const txt_view *v, int tile, double x, double y, void *
         at[k] = (size_t)txm_clampi(ix, 0, l->width - 1) * (size_t)v->atlas.channels;
         rows[k] = txm_image_row_const(&v->atlas, txm_clampi(iy, top, bottom));
     }
-    for (int c = 0; c < v->atlas.channels; c++) {
+    const int last = v->atlas.channels - 1, has_alpha = txm_image_has_alpha(&v->atlas);
+    double alpha[4] = {1, 1, 1, 1}, shown = 0;
+    for (int k = 0; k < 4 && has_alpha; k++) {
+        alpha[k] = fmax(txt_stored(v->atlas.sample, rows[k / 2], at[k & 1] + (size_t)last), 0);
+        shown += alpha[k] * (k & 1 ? fx : 1 - fx) * (k / 2 ? fy : 1 - fy);
+    }
+    const int is_even = alpha[0] == alpha[1] && alpha[0] == alpha[2] && alpha[0] == alpha[3];
+    for (int c = 0; c <= last; c++) {
         double s[4];
-        for (int k = 0; k < 4; k++)
+        const int by_alpha = c < last && !is_even && shown > 0;
+        for (int k = 0; k < 4; k++) {
             s[k] = txt_stored(v->atlas.sample, rows[k / 2], at[k & 1] + (size_t)c);
+            if (by_alpha) s[k] *= alpha[k] / shown;
+        }
         const double above = s[0] * (1 - fx) + s[1] * fx, below = s[2] * (1 - fx) + s[3] * fx;
         const double value = above * (1 - fy) + below * fy;
         if (v->atlas.sample == TXM_F32) ((float *)to)[c] = txm_float(value);

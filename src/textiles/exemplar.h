@@ -154,8 +154,21 @@ static double txt_keys(double x) {
     return 0;
 }
 
-/* One row of a lattice sheet: interpolate six rows of the picture, then along the row. */
-static void txt_resample_row(const txm_image *in, const txm_image *out, int row, double *line) {
+/* Is a pixel of an image with alpha not fully opaque? */
+static int txt_is_translucent(const txm_image *im) {
+    for (int y = 0; y < im->height; y++) {
+        for (int x = 0; x < im->width; x++) {
+            if (txm_image_get(im, x, y, im->channels - 1) < 1) return 1;
+        }
+    }
+    return 0;
+}
+
+/* One row of a lattice sheet: interpolate six rows of the picture, then along the row. by_alpha:
+   colours are weighted by alpha; where so little shows that the weights below 0 count, they are
+   those of the nearest pixel. */
+static void txt_resample_row(const txm_image *in, const txm_image *out, int row, int by_alpha,
+                             double *line) {
     const double y = row * 0.86602540378443864676;
     const int top = (int)floor(y), n = in->channels;
     double weight[6], half[6];
@@ -166,20 +179,29 @@ static void txt_resample_row(const txm_image *in, const txm_image *out, int row,
     for (int x = 0; x < in->width; x++) {
         for (int c = 0; c < n; c++) {
             double sum = 0;
-            for (int k = 0; k < 6; k++)
-                sum += weight[k] *
-                       txm_image_get(in, x, txm_clampi(top - 2 + k, 0, in->height - 1), c);
+            for (int k = 0; k < 6; k++) {
+                const int v = txm_clampi(top - 2 + k, 0, in->height - 1);
+                double value = txm_image_get(in, x, v, c);
+                if (by_alpha && c + 1 < n)
+                    value *= (double)txm_clampf(txm_image_get(in, x, v, n - 1), 0, 1);
+                sum += weight[k] * value;
+            }
             line[x * n + c] = sum;
         }
     }
+    const int nearest = txm_clampi((int)floor(y + 0.5), 0, in->height - 1);
     for (int x = 0; x < out->width; x++) {
-        for (int c = 0; c < n; c++) {
+        double shown = 1;
+        for (int c = n - 1; c >= 0; c--) { /* alpha first */
             double value = line[x * n + c];
             if (row & 1) {
                 value = 0;
                 for (int k = 0; k < 6; k++)
                     value += half[k] * line[txm_clampi(x - 2 + k, 0, in->width - 1) * n + c];
             }
+            if (by_alpha && c == n - 1) shown = value;
+            else if (by_alpha && shown > 0.25) value /= shown;
+            else if (by_alpha) value = txm_image_get(in, x, nearest, c);
             txm_image_set(out, x, row, c, txm_float(value));
         }
     }
@@ -203,9 +225,14 @@ static txm_status txt_make_sheets(txt_build *b) {
         if (b->texels > TEXTILES_MAX_PIXELS)
             return txm_fail(b->env, TXM_TOO_LARGE, "exemplars: more than TEXTILES_MAX_PIXELS");
         for (int m = 0; m < b->set->map_count; m++) {
-            const txm_image in = txm_image_resolve(d->exemplars[e].maps[m]);
+            txm_image in = txm_image_resolve(d->exemplars[e].maps[m]);
+            const int has_alpha = b->set->maps[m].has_alpha;
+            const txm_status status =
+                has_alpha ? txm_image_bled(&in, 0, &b->arena, b->env, &in) : TXM_OK;
+            if (status != TXM_OK) return status;
             s->maps[m] = in;
             if (!b->is_triangle) continue;
+            const int by_alpha = has_alpha && txt_is_translucent(&in);
             txm_image *out = &s->maps[m];
             out->width = s->width;
             out->height = s->height;
@@ -217,7 +244,7 @@ static txm_status txt_make_sheets(txt_build *b) {
                 txm_free(b->env, line);
                 return txm_fail(b->env, TXM_OUT_OF_MEMORY, "no memory for the exemplars");
             }
-            for (int y = 0; y < s->height; y++) txt_resample_row(&in, out, y, line);
+            for (int y = 0; y < s->height; y++) txt_resample_row(&in, out, y, by_alpha, line);
             txm_free(b->env, line);
         }
         b->set->sheets[e].first = s->first;
@@ -316,7 +343,7 @@ static txm_status txt_fill_features(txt_build *b) {
             for (int y = 0; y < im->height; y++) {
                 for (int x = 0; x < im->width; x++, to += b->stride) {
                     double v = (txm_image_get(im, x, y, c) - low) * scale;
-                    if (n % 2 == 0 && c + 1 < n)
+                    if (b->set->maps[m].has_alpha && c + 1 < n)
                         v *= txm_clampf(txm_image_get(im, x, y, n - 1), 0, 1);
                     *to = (uint8_t)txm_clampi((int)(v + 0.5), 0, 255);
                 }

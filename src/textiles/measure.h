@@ -5,11 +5,20 @@
 
 /* ---- public: measuring ------------------------------------------------------------------- */
 
-/* sum over the channels of the absolute difference of two texels */
+/* sum over the channels of the absolute difference of two texels; colours count as they show */
 static double txt_texel_step(const txt_map *m, const uint8_t *p, const uint8_t *q) {
-    double sum = 0;
-    for (size_t c = 0; c < (size_t)m->channels; c++)
-        sum += fabs(txt_stored(m->sample, p, c) - txt_stored(m->sample, q, c));
+    const size_t last = (size_t)m->channels - 1;
+    const double full = m->sample == TXM_F32 ? 1 : m->sample == TXM_U16 ? 65535 : 255;
+    double sum = 0, shown_p = 1, shown_q = 1;
+    if (m->has_alpha) {
+        shown_p = fmin(fmax(txt_stored(m->sample, p, last) / full, 0), 1);
+        shown_q = fmin(fmax(txt_stored(m->sample, q, last) / full, 0), 1);
+    }
+    for (size_t c = 0; c <= last; c++) {
+        const int is_alpha = m->has_alpha && c == last;
+        sum += fabs(txt_stored(m->sample, p, c) * (is_alpha ? 1 : shown_p) -
+                    txt_stored(m->sample, q, c) * (is_alpha ? 1 : shown_q));
+    }
     return sum;
 }
 

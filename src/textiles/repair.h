@@ -5,6 +5,9 @@
 
 /* ---- repair ------------------------------------------------------------------------------ */
 
+#define TXT_FAINT 0.125 /* alpha up to which a repaired colour says too little, and ...            */
+#define TXT_CLEAR 0.5   /* ... from which on it is taken as it is                                  */
+
 /* Memory for txm_poisson from one block, so that threads do not call the allocator. */
 typedef struct txt_pool {
     uint8_t *block;
@@ -35,6 +38,30 @@ static float txt_sheet_value(const txt_build *b, int map, int32_t t, int channel
     const txt_sheet *s = &b->sheets[txt_sheet_of(b->set, t)];
     const int at = t - s->first;
     return txm_image_get(&s->maps[map], at % s->width, at / s->width, channel);
+}
+
+/* The same as it is repaired: colours as much as they show. */
+static float txt_repair_value(const txt_build *b, int map, int32_t t, int channel) {
+    const int last = b->set->maps[map].channels - 1;
+    const float value = txt_sheet_value(b, map, t, channel);
+    if (!b->set->maps[map].has_alpha || channel == last) return value;
+    const float alpha = txm_clampf(txt_sheet_value(b, map, t, last), 0, 1);
+    return txm_float((double)value * (double)alpha);
+}
+
+/* The straight colour and the alpha of a repaired texel. Opaque texels stay opaque and transparent
+   ones transparent; the less shows, the more the colour is that of the exemplar. */
+static void txt_repair_shown(const txt_build *b, int map, int32_t t, float *pixel) {
+    const int last = b->set->maps[map].channels - 1;
+    const double alpha = (double)txm_clampf(txt_sheet_value(b, map, t, last), 0, 1);
+    const double shown = (double)pixel[last], least = shown < alpha ? shown : alpha;
+    const double trust = (least - TXT_FAINT) / (TXT_CLEAR - TXT_FAINT);
+    for (int c = 0; c < last; c++) {
+        const float own = txt_sheet_value(b, map, t, c);
+        const float repaired = trust > 0 ? txm_float((double)pixel[c] / shown) : own;
+        pixel[c] = trust >= 1 ? repaired : txm_lerpf(own, repaired, txm_float(trust > 0 ? trust : 0));
+    }
+    pixel[last] = txm_float(alpha + (shown - alpha) * 4 * alpha * (1 - alpha));
 }
 
 typedef struct txt_repair {
@@ -69,7 +96,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
     }
     if (!any) return;
     for (int m = 0; m < set->map_count; m++) {
-        const int n = set->maps[m].channels;
+        const int n = set->maps[m].channels, has_alpha = set->maps[m].has_alpha;
         txm_poisson_desc desc;
         txm_env env;
         memset(&desc, 0, sizeof desc);
@@ -80,7 +107,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
         r->pool.used = 0;
         for (int p = 0; p < side * side; p++) {
             for (int k = 0; k < n; k++) {
-                r->image[p * n + k] = c->inside[p] ? txt_sheet_value(b, m, c->shows[p], k) : 0.0f;
+                r->image[p * n + k] = c->inside[p] ? txt_repair_value(b, m, c->shows[p], k) : 0.0f;
                 r->target[p * n + k] = 0;
             }
         }
@@ -97,11 +124,11 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
                         const double here = r->image[p * n + k], there = r->image[q * n + k];
                         double sum = 0, count = 0;
                         if (pq >= 0) {
-                            sum += txt_sheet_value(b, m, pq, k) - here;
+                            sum += txt_repair_value(b, m, pq, k) - here;
                             count += 1;
                         }
                         if (qp >= 0) {
-                            sum += there - txt_sheet_value(b, m, qp, k);
+                            sum += there - txt_repair_value(b, m, qp, k);
                             count += 1;
                         }
                         const double step = count > 0 ? sum / count : there - here;
@@ -125,6 +152,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
         const txm_image out = {txt_texel(set, m, c->tile, 0, 0), side, side, n,
                                set->maps[m].sample, 0};
         for (int p = 0; p < side * side; p++) {
+            if (r->mask[p] && has_alpha) txt_repair_shown(b, m, c->shows[p], r->image + p * n);
             for (int k = 0; k < n && r->mask[p]; k++)
                 txm_image_set(&out, p % side, p / side, k, r->image[p * n + k]);
         }

@@ -8,6 +8,7 @@
 /* One map of all tiles: tile by tile side x side texels. */
 typedef struct txt_map {
     int channels;
+    int has_alpha;   /* the last of 2 or 4 channels is alpha: the map is no data */
     txm_sample sample;
     size_t texel;    /* bytes of one texel                                     */
     uint8_t *pixels; /* count * side * side * texel bytes; aligned for sample  */
@@ -186,7 +187,7 @@ static void txt_list_tiles(textiles_set *s, const textiles_desc *d) {
 }
 
 /* A set with its tiles listed and memory for their texels. Of maps only channels and sample are
-   read. */
+   read, and what is alpha follows from the description. */
 static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int map_count,
                                int with_source, txm_env *env, textiles_set **out) {
     textiles_set head;
@@ -213,6 +214,7 @@ static txm_status txt_set_make(const textiles_desc *d, const txt_map *maps, int 
     head.lookup = (int32_t *)txm_arena_alloc(&head.arena, codes, sizeof(int32_t));
     for (int m = 0; m < map_count; m++) {
         head.maps[m] = maps[m];
+        head.maps[m].has_alpha = maps[m].channels % 2 == 0 && !(d->data_maps >> m & 1);
         head.maps[m].texel = (size_t)maps[m].channels * txm_sample_bytes(maps[m].sample);
         head.maps[m].pixels = (uint8_t *)txm_arena_zero(&head.arena, all, head.maps[m].texel);
     }
@@ -248,6 +250,19 @@ static int txt_tile_is_finite(const txm_image *im, textiles_kind kind) {
         if (!txm_image_is_finite(&row)) return 0;
     }
     return 1;
+}
+
+/* Replace the hidden colours of all tiles of imported squares by those of visible neighbours. */
+static txm_status txt_bleed_tiles(const textiles_set *s, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int i = 0; i < s->count && s->kind != TEXTILES_TRIANGLE; i++) {
+        for (int m = 0; m < s->map_count && status == TXM_OK; m++) {
+            const txm_image tile = {txt_texel(s, m, i, 0, 0), s->side, s->side,
+                                    s->maps[m].channels, s->maps[m].sample, 0};
+            if (s->maps[m].has_alpha) status = txm_image_bleed(&tile, 0, env);
+        }
+    }
+    return status;
 }
 
 /* ---- public: sets ------------------------------------------------------------------------- */
@@ -306,8 +321,10 @@ TEXTILES_API txm_status textiles_import(const textiles_desc *desc, const txm_ima
                        (size_t)side * s->maps[m].texel);
         }
     }
-    *out = s;
-    return TXM_OK;
+    status = txt_bleed_tiles(s, env);
+    if (status != TXM_OK) textiles_set_free(s);
+    else *out = s;
+    return status;
 }
 
 TEXTILES_API textiles_kind textiles_kind_of(const textiles_set *set) {

@@ -27,7 +27,7 @@ static const cli_manual tiles_manual = {
     "edges of a tile are unchanged pixels of EXEMPLAR on both sides of the joint. A side of\n"
     "EXEMPLAR should be at least three times that of a tile.\n"
     "Maps of the same material (normals, roughness) are cut in register with --maps:\n"
-    "atlas-2.png holds the first of them, and so on. Uneven light of EXEMPLAR and of --more and\n"
+    "atlas-2.png holds the first of them, and so on; of RGBA maps in --data A is no alpha. Uneven light of EXEMPLAR and of --more and\n"
     "--edges, not that of maps, is evened out, with a warning, if it would show; see --even.\n",
     "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
@@ -306,6 +306,21 @@ static int check_options(cli *run, const textiles_desc *d, textiles_packing pack
     return CLI_DONE;
 }
 
+/* The maps of --data as bits; 0 after a message. */
+static int parse_data(cli *run, const char *data, unsigned *maps) {
+    double number[TEXTILES_MAX_MAPS];
+    const int count =
+        parse_numbers(run, "--data", data, TEXTILES_MAX_MAPS, 0, TEXTILES_MAX_MAPS - 1, number);
+    for (int i = 0; i < count; i++) {
+        if (number[i] != (int)number[i]) {
+            cli_fail(run, CLI_USAGE, "--data '%s': give numbers of maps; EXEMPLAR is 0", data);
+            return 0;
+        }
+        *maps |= 1u << (int)number[i];
+    }
+    return count;
+}
+
 static void set_figures(cli *run, const textiles_set *set, const textiles_layout *layout,
                         const textiles_joints *joints) {
     cli_figure(run, "tiles", textiles_count(set));
@@ -320,7 +335,7 @@ static int run_tiles(int argc, char **argv) {
     cli run;
     textiles_desc desc = {0};
     const char *kind = NULL, *packing = "packed", *repair = "poisson", *classes = NULL;
-    const char *maps = NULL, *more = NULL, *edges = NULL;
+    const char *maps = NULL, *more = NULL, *edges = NULL, *data = NULL;
     int even = EVEN_AUTO, gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
     const cli_option options[] = {
         {CLI_TEXT, "--kind", "KIND", "wang, corner, triangle or frame", &kind, 0, 0},
@@ -336,6 +351,8 @@ static int run_tiles(int argc, char **argv) {
         {CLI_TEXT, "--classes", "LIST", "frame: edge colors n,e,s,w of each class, separated by ';'",
          &classes, 0, 0},
         {CLI_INPUTS, "--maps", "M1,M2,...", "more maps of the exemplar, cut in register", &maps, 0, 0},
+        {CLI_TEXT, "--data", "I,J,...",
+         "these maps hold quantities, not colors; --maps count from 1", &data, 0, 0},
         {CLI_INPUTS, "--more", "E2,E3,...", "more exemplars of the same texture", &more, 0, 0},
         {CLI_INPUTS, "--edges", "P0,P1,...", "pictures to cut the edges from, one for each color",
          &edges, 0, 0},
@@ -374,6 +391,7 @@ static int run_tiles(int argc, char **argv) {
     if (status) return status;
     if (maps && (more || edges))
         return cli_fail(&run, CLI_USAGE, "--maps goes with one exemplar, without --more and --edges");
+    if (data && !parse_data(&run, data, &desc.data_maps)) return CLI_USAGE;
     status = announce_set(&run, maps);
     if (status) return status;
 

@@ -43,8 +43,14 @@ static int mips_make(mips *m, const txm_image *texture) {
     float linear[256];
     txm_env env = {0};
     for (int i = 0; i < 256; i++) linear[i] = txm_srgb_to_linear((float)i / 255.0f);
-    const txm_image from = txm_image_resolve(*texture);
-    if (from.sample == TXM_F32 || !add_level(m, from.width, from.height)) return 0;
+    txm_image from;
+    txm_arena shown; /* a copy whose hidden colours are those of visible neighbours, if there are any */
+    txm_arena_init(&shown, &env);
+    if (texture->sample == TXM_F32 || !add_level(m, texture->width, texture->height)) return 0;
+    if (txm_image_bled(texture, 0, &shown, &env, &from) != TXM_OK) {
+        txm_arena_free(&shown);
+        return 0;
+    }
     const int n = from.channels;
     for (int y = 0; y < from.height; y++) {
         const unsigned char *row = (const unsigned char *)txm_image_row_const(&from, y);
@@ -57,6 +63,7 @@ static int mips_make(mips *m, const txm_image *texture) {
             }
         }
     }
+    txm_arena_free(&shown);
     while (m->count < MAX_LEVELS) {
         const txm_image *last = &m->levels[m->count - 1];
         if (last->width == 1 && last->height == 1) break;
