@@ -19,7 +19,7 @@ static int take_part(const char **at, const char *separators, char name[CLI_MAX_
     const char *c = *at;
     while (*c && !is_one_of(*c, separators)) {
         if (*n + 1 == CLI_MAX_PATH) return 0;
-        c += *c == '\\' && is_one_of(c[1], separators);
+        c += *c == '\\' && *separators && is_one_of(c[1], ",;");
         name[(*n)++] = *c++;
     }
     name[*n] = 0;
