@@ -579,6 +579,8 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #define TEXSYN_IMPLEMENTED
 
 #include "texsyn/config.h"
+#include "texsyn/mask.h"
+#include "texsyn/alpha.h"
 #include "texsyn/model.h"
 #include "texsyn/energy.h"
 #include "texsyn/potential.h"
@@ -587,7 +589,6 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/example.h"
 #include "texsyn/neighbourhood.h"
 #include "texsyn/file.h"
-#include "texsyn/mask.h"
 #include "texsyn/learn.h"
 #include "texsyn/synthesis.h"
 #include "texsyn/ground.h"

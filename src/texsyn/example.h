@@ -1,6 +1,7 @@
 #ifndef TEXSYN_EXAMPLE_H
 #define TEXSYN_EXAMPLE_H
 
+#include "alpha.h"
 #include "model.h"
 
 /* ---- the example --------------------------------------------------------------------------
@@ -12,33 +13,56 @@ typedef struct txs_source { /* one level of the example */
     int width, height;
     float *value;      /* planes                                               */
     uint8_t *mask;     /* non-zero: belongs to the texture; NULL = all do      */
+    uint8_t *weight;   /* of colours, see alpha.h; NULL = all are visible      */
     txs_canvas canvas; /* quantised, margin 0                                  */
     int step;          /* statistics are taken from every step-th row          */
 } txs_source;
 
-/* Principal components of the colours inside the mask. Rounded as the model file keeps them. */
-static void txs_find_bands(texsyn_model *m, const txm_image *im, const txs_source *s) {
+/* Is it the band of alpha? */
+static int txs_is_alpha(const texsyn_model *m, int band) {
+    return m->channels == 4 && m->basis[band][3] != 0;
+}
+
+/* Alpha becomes the first band, the one whose shapes are learned. */
+static void txs_put_alpha_first(texsyn_model *m) {
+    for (int b = m->bands - 1; b > 0; b--) {
+        if (!txs_is_alpha(m, b)) continue;
+        float row[TXS_MAX_BANDS];
+        memcpy(row, m->basis[b], sizeof row);
+        memcpy(m->basis[b], m->basis[b - 1], sizeof row);
+        memcpy(m->basis[b - 1], row, sizeof row);
+    }
+}
+
+/* Principal components of the visible colours inside the mask. Rounded as the model file keeps
+   them. Alpha is the last band, if it varies. Returns non-zero if it varies more than any colour. */
+static int txs_find_bands(texsyn_model *m, const txm_image *im, const txs_source *s) {
     const int colours = m->channels < 3 ? 1 : 3;
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     double mean[4] = {0, 0, 0, 0}, square[4] = {0, 0, 0, 0}, cov[6] = {0, 0, 0, 0, 0, 0};
-    double values[3], vectors[3][3], count = 0;
+    double values[3], vectors[3][3], count = 0, visible = 0;
     for (int pass = 0; pass < 2; pass++) {
         for (size_t i = 0; i < pixels; i++) {
             double x[4];
             if (s->mask && !s->mask[i]) continue;
+            const double weight = s->weight ? (double)s->weight[i] : 1;
             for (int c = 0; c < m->channels; c++)
                 x[c] = 255.0 * (double)txm_image_get(im, (int)(i % (size_t)s->width),
                                                      (int)(i / (size_t)s->width), c) -
                        mean[c];
-            for (int c = 0; c < m->channels && !pass; c++) square[c] += x[c];
+            for (int c = 0; c < m->channels && !pass; c++)
+                square[c] += c < 3 ? weight * x[c] : x[c];
             count += !pass;
-            for (int c = 0, k = 0; c < 3 && pass; c++)
+            visible += pass ? 0 : weight;
+            for (int c = 0, k = 0; c < 3 && pass && visible > 0; c++)
                 for (int d = c; d < 3; d++, k++)
-                    if (d < colours) cov[k] += x[c] * x[d] / count;
+                    if (d < colours) cov[k] += weight * (x[c] * x[d]) / visible;
             if (pass && m->channels == 4) square[3] += x[3] * x[3] / count;
         }
         for (int c = 0; c < m->channels && !pass; c++) {
-            mean[c] = (double)(m->mean[c] = txs_short_float((float)(square[c] / count)));
+            const double total = c < 3 ? visible : count;
+            m->mean[c] = txs_short_float((float)(total > 0 ? square[c] / total : 0));
+            mean[c] = (double)m->mean[c];
             square[c] = 0;
         }
     }
@@ -52,6 +76,7 @@ static void txs_find_bands(texsyn_model *m, const txm_image *im, const txs_sourc
         m->bands++;
     }
     if (m->channels == 4 && square[3] >= 0.05) m->basis[m->bands++][3] = 1;
+    return square[3] > values[0];
 }
 
 /* The bands of the example at full resolution. */
@@ -70,20 +95,46 @@ static void txs_split(const texsyn_model *m, const txm_image *im, txs_source *s)
     }
 }
 
+/* The mean of 2 x 2 colours as far as they are visible. */
+static float txs_visible_mean(const float *p, const uint8_t *weight, size_t row) {
+    const size_t at[4] = {0, 1, row, row + 1};
+    double sum = 0, total = 0;
+    for (int k = 0; k < 4; k++) {
+        sum += (double)weight[at[k]] * (double)p[at[k]];
+        total += weight[at[k]];
+    }
+    return txm_float(sum / total);
+}
+
+/* The weight of a coarser pixel; not 0 where anything is visible. */
+static uint8_t txs_mean_weight(const uint8_t *weight, size_t row) {
+    const int sum = weight[0] + weight[1] + weight[row] + weight[row + 1];
+    return (uint8_t)(sum > 0 && sum < 4 ? 1 : sum / 4);
+}
+
 /* The next coarser level: means of 2 x 2; a pixel belongs to the texture if all four do. */
-static void txs_halve(const txs_source *fine, txs_source *s, int bands) {
+static void txs_halve(const txs_source *fine, txs_source *s, const texsyn_model *m) {
     const size_t w = (size_t)fine->width;
     float *out = s->value;
-    for (int b = 0; b < bands; b++) {
+    for (int b = 0; b < m->bands; b++) {
         const float *plane = fine->value + (size_t)b * w * (size_t)fine->height;
+        const uint8_t *weights = txs_is_alpha(m, b) ? NULL : fine->weight;
         for (int y = 0; y < s->height; y++) {
             for (int x = 0; x < s->width; x++) {
-                const float *p = plane + (size_t)(2 * y) * w + 2 * (size_t)x;
-                *out++ =
-                    txm_float(((double)p[0] + (double)p[1] + (double)p[w] + (double)p[w + 1]) / 4);
+                const size_t at = (size_t)(2 * y) * w + 2 * (size_t)x;
+                const float *p = plane + at;
+                if (weights && txs_mean_weight(weights + at, w))
+                    *out++ = txs_visible_mean(p, weights + at, w);
+                else
+                    *out++ = txm_float(
+                        ((double)p[0] + (double)p[1] + (double)p[w] + (double)p[w + 1]) / 4);
             }
         }
     }
+    for (int y = 0; y < s->height && s->weight; y++)
+        for (int x = 0; x < s->width; x++)
+            s->weight[(size_t)y * (size_t)s->width + (size_t)x] =
+                txs_mean_weight(fine->weight + (size_t)(2 * y) * w + 2 * (size_t)x, w);
     for (int y = 0; y < s->height && s->mask; y++) {
         for (int x = 0; x < s->width; x++) {
             const uint8_t *p = fine->mask + (size_t)(2 * y) * w + 2 * (size_t)x;
@@ -102,9 +153,16 @@ static double txs_value(const txs_level *l, int band, double q) {
     return (double)l->low[band] + q * (double)l->step[band];
 }
 
+/* How much pixel i of a band counts. */
+static size_t txs_count_of(const txs_source *s, const uint8_t *weight, size_t i) {
+    if (s->mask && !s->mask[i]) return 0;
+    return weight ? weight[i] : 1;
+}
+
 /* Choose the quantisation of a band: 32 steps between the 0.1 and 99.9 percentiles, but no finer
-   than one gray level; and quantise. Returns the share of a step that the values fill. */
-static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
+   than one gray level; and quantise. weight: of the pixels, or NULL. Returns the share of a step
+   that the values fill. */
+static float txs_quantise_band(txs_level *l, int band, txs_source *s, const uint8_t *weight) {
     enum { FINE = 4096 };
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     const float *v = s->value + (size_t)band * pixels;
@@ -112,15 +170,18 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     double low = 1e300, high = -1e300;
     size_t count = 0, seen = 0, histogram[FINE] = {0};
     for (size_t i = 0; i < pixels; i++) {
-        if (s->mask && !s->mask[i]) continue;
+        const size_t counts = txs_count_of(s, weight, i);
+        if (!counts) continue;
         low = (double)v[i] < low ? (double)v[i] : low;
         high = (double)v[i] > high ? (double)v[i] : high;
-        count++;
+        count += counts;
     }
     const double bin = (high - low) / (double)FINE;
-    for (size_t i = 0; i < pixels && bin > 0; i++)
-        if (!s->mask || s->mask[i])
-            histogram[txm_clampi((int)(((double)v[i] - low) / bin), 0, FINE - 1)]++;
+    for (size_t i = 0; i < pixels && bin > 0; i++) {
+        const size_t counts = txs_count_of(s, weight, i);
+        if (counts)
+            histogram[txm_clampi((int)(((double)v[i] - low) / bin), 0, FINE - 1)] += counts;
+    }
     double from = low, to = high;
     for (int i = 0; i < FINE && bin > 0; i++) {
         if (seen <= count / 1000) from = low + bin * i;
@@ -137,7 +198,7 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     for (size_t i = 0; i < pixels; i++) {
         q[i] = (uint8_t)txs_quantise(l, band, (double)v[i]);
         double off = ((double)v[i] - txs_value(l, band, q[i])) / (double)l->step[band];
-        if ((!s->mask || s->mask[i]) && fabs(off) <= 0.5) spread += off * off;
+        if (fabs(off) <= 0.5) spread += (double)txs_count_of(s, weight, i) * (off * off);
     }
     double fill = sqrt(12 * spread / (double)count); /* 1 if evenly spread over the steps */
     return (float)floor((fill > 1 ? 1 : fill) * 255 + 0.5) / 255;
@@ -225,8 +286,10 @@ static void txs_fill_labels(const txs_level *level, txs_canvas *canvas, int band
     txs_wrap(canvas, 2 * bands);
 }
 
-/* Choose the limits of the labels: thirds of the example. Returns 0 if there is no memory. */
-static int txs_cut_labels(txs_level *level, const txs_source *s, int bands, txm_arena *arena) {
+/* Choose the limits of the labels: thirds of the example. weight: of the first band, or NULL.
+   Returns 0 if there is no memory. */
+static int txs_cut_labels(txs_level *level, const txs_source *s, const uint8_t *weight, int bands,
+                          txm_arena *arena) {
     enum { CURVES = 8 * TXS_VALUES + 1 };
     uint32_t *gradients =
         (uint32_t *)txm_arena_zero(arena, TXS_MAX_GRADIENT + 1, sizeof *gradients);
@@ -235,7 +298,8 @@ static int txs_cut_labels(txs_level *level, const txs_source *s, int bands, txm_
     for (int y = 0; y < s->height; y++) {
         for (int x = 0; x < s->width; x++) {
             int gradient, curve;
-            if (s->mask && !s->mask[(size_t)y * (size_t)s->width + (size_t)x]) continue;
+            const size_t i = (size_t)y * (size_t)s->width + (size_t)x;
+            if ((s->mask && !s->mask[i]) || (weight && !weight[i])) continue;
             txs_look_at(&s->canvas, bands, x, y, &gradient, &curve);
             gradients[gradient]++;
             curves[curve + CURVES / 2]++;

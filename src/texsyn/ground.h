@@ -207,7 +207,7 @@ static size_t txs_ground_quantise(const txs_ground *g, int label, int bands, txs
     s.canvas.pixels = bytes;
     s.canvas.plane = (ptrdiff_t)count;
     for (int b = 0; b < bands; b++) {
-        const float fill = txs_quantise_band(level, b, &s);
+        const float fill = txs_quantise_band(level, b, &s, NULL);
         if (dither) dither[b] = fill;
     }
     return count;

@@ -36,6 +36,33 @@ static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
     return TXM_OK;
 }
 
+/* Bands of the example at full resolution; hidden pixels get borrowed colours. s->weight: room for
+   the weights, set to NULL if there is no need of them. Returns 0 if there is no memory. */
+static int txs_split_visible(texsyn_model *m, const txm_image *im, txs_source *s,
+                             txm_arena *arena) {
+    const size_t pixels = (size_t)s->width * (size_t)s->height;
+    if (s->weight && !txs_weigh(im, s->mask, s->weight)) s->weight = NULL;
+    if (txs_find_bands(m, im, s) && s->weight) txs_put_alpha_first(m);
+    txs_split(m, im, s);
+    if (!s->weight) return 1;
+    uint32_t visible = 0, *list = (uint32_t *)txm_arena_alloc(arena, pixels, sizeof *list);
+    for (int b = 0; b < m->bands && list; b++)
+        if (!txs_is_alpha(m, b))
+            visible = txs_borrow(s->value + (size_t)b * pixels, s->weight, s->width, s->height, list);
+    if (!visible) s->weight = NULL;
+    return list != NULL;
+}
+
+/* Are there enough pixels inside the mask, and a visible one? */
+static int txs_is_enough(const txs_source *s) {
+    const size_t pixels = (size_t)s->width * (size_t)s->height;
+    size_t inside = 0, visible = 0;
+    for (size_t i = 0; i < pixels && s->mask; i++) inside += s->mask[i] != 0;
+    for (size_t i = 0; i < pixels && s->weight; i++)
+        visible += (!s->mask || s->mask[i]) && s->weight[i];
+    return (!s->mask || inside >= 256) && (!s->weight || visible);
+}
+
 /* Split the example into levels of quantised bands. */
 static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, txs_source *source,
                               txm_arena *arena, txm_env *env) {
@@ -54,6 +81,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->step = (int)(pixels / (1 << 17)) | 1;
         s->value = (float *)txm_arena_alloc(arena, pixels * (size_t)m->channels, sizeof(float));
         if (desc->mask.pixels) s->mask = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+        if (m->channels == 4) s->weight = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
         s->canvas.width = s->width;
         s->canvas.height = s->height;
         s->canvas.stride = s->width;
@@ -69,26 +97,26 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
             if (s->mask && seen < 256)
                 return txm_fail(env, TXM_TOO_SMALL,
                                 "mask: fewer than 256 pixels (16 x 16) are not 0");
-            txs_find_bands(m, im, s);
-            txs_split(m, im, s);
+            if (!txs_split_visible(m, im, s, arena))
+                return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         } else {
-            txs_halve(&source[i - 1], s, m->bands);
-            size_t seen = 0;
-            for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
-            if (s->mask && seen < 256) {
-                m->levels = i; /* too little of an irregular region is left at this level */
+            if (!source[i - 1].weight) s->weight = NULL;
+            txs_halve(&source[i - 1], s, m);
+            if (!txs_is_enough(s)) { /* too little of an irregular region is left at this level */
+                m->levels = i;
                 break;
             }
         }
         for (int b = 0; b < m->bands; b++) {
-            float fill = txs_quantise_band(&m->level[i], b, s);
+            float fill = txs_quantise_band(&m->level[i], b, s, txs_is_alpha(m, b) ? NULL : s->weight);
             if (i == 0) m->dither[b] = fill;
         }
     }
     for (int i = m->levels - 2; i >= 0; i--) {
         txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
                         m->bands);
-        if (!txs_cut_labels(&m->level[i], &source[i], m->bands, arena))
+        if (!txs_cut_labels(&m->level[i], &source[i], txs_is_alpha(m, 0) ? NULL : source[i].weight,
+                            m->bands, arena))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         txs_fill_labels(&m->level[i], &source[i].canvas, m->bands);
     }

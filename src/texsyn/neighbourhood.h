@@ -35,43 +35,55 @@ static void txs_find_tails(int at[TXS_MAX_MEMBERS][2], int members, int width, i
     }
 }
 
-/* Do all members of the clique at (x, y) belong to the texture? */
-static int txs_is_masked(const uint8_t *mask, int width, int at[TXS_MAX_MEMBERS][2], int members,
-                         int x, int y) {
-    int all = 1;
-    for (int i = 0; i < members; i++)
-        all &= mask[(ptrdiff_t)(y + at[i][1]) * width + x + at[i][0]] != 0;
-    return all;
+/* Which pixels of an example count: those inside the mask; with weights, by the least weight of a
+   clique's members. */
+typedef struct txs_stencil {
+    const uint8_t *mask, *weight; /* a byte for each pixel; NULL = all are inside, or weigh 1 */
+    int width;
+} txs_stencil;
+
+/* How much the clique at (x, y) counts. */
+static uint32_t txs_clique_weight(const txs_stencil *s, int at[TXS_MAX_MEMBERS][2], int members,
+                                  int x, int y) {
+    uint32_t least = s->weight ? (uint32_t)TXS_OPAQUE : 1;
+    for (int i = 0; i < members; i++) {
+        const ptrdiff_t p = (ptrdiff_t)(y + at[i][1]) * s->width + x + at[i][0];
+        if (s->mask && !s->mask[p]) least = 0;
+        if (s->weight && s->weight[p] < least) least = s->weight[p];
+    }
+    return least;
 }
 
-/* Histogram of a clique type over a canvas: of the example, cliques that lie inside image and
-   mask; of a synthesised canvas (wrap) all of them. Every step-th row. Returns the number of
+/* Histogram of a clique type over a canvas: of the example (stencil), cliques that lie inside it and
+   count; of a synthesised canvas (NULL) all of them. Every step-th row. Returns the number of
    cliques; share[] sums to about TXS_ONE. */
-static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, int step, int bands,
+static int64_t txs_measure(const txs_canvas *c, const txs_stencil *stencil, int step, int bands,
                            const txs_level *level, const txs_type *t, int32_t share[TXS_BINS]) {
+    const int is_partial = stencil && (stencil->mask || stencil->weight);
     int at[TXS_MAX_MEMBERS][2], inside[4] = {0, 0, c->width, c->height};
     const int members = txs_footprint(t, at);
     uint32_t h[2][TXS_BINS + 15];
     const txs_tally y = txs_tally_make(t, level, c, bands);
     int64_t total = 0;
     memset(h, 0, sizeof h);
-    if (!wrap) txs_find_tails(at, members, c->width, c->height, inside);
+    if (stencil) txs_find_tails(at, members, c->width, c->height, inside);
     const int x0 = inside[0], y0 = inside[1], x1 = inside[2], y1 = inside[3];
     uint8_t class_of[2 * TXS_MAX_RESPONSE + 1];
     if (t->kind == TEXSYN_FILTER) txs_response_classes(t->scale, class_of);
     for (int row = y0; row < y1; row += step) {
         const uint8_t *p = txs_at(c, 0, 0, row);
-        if (mask || t->phase) {
+        if (is_partial || t->phase) {
             for (int x = x0; x < x1; x++) {
-                if (!txs_is_tail(t, x, row) ||
-                    (mask && !txs_is_masked(mask, c->width, at, members, x, row)))
-                    continue;
+                if (!txs_is_tail(t, x, row)) continue;
+                const uint32_t weight =
+                    is_partial ? txs_clique_weight(stencil, at, members, x, row) : 1;
+                if (!weight) continue;
                 if (t->kind == TEXSYN_FILTER) {
                     int16_t r;
                     txs_responses(c, t, x, row, 1, &r);
-                    h[0][class_of[r + TXS_MAX_RESPONSE]]++;
+                    h[0][class_of[r + TXS_MAX_RESPONSE]] += weight;
                 } else {
-                    h[0][txs_bin(&y, p + x)]++;
+                    h[0][txs_bin(&y, p + x)] += weight;
                 }
             }
         } else if (t->kind == TEXSYN_FILTER) {
@@ -95,7 +107,7 @@ static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, i
     for (int i = 0; i < TXS_BINS; i++)
         share[i] =
             total ? (int32_t)(((int64_t)(h[0][i] + h[1][i]) * TXS_ONE + total / 2) / total) : 0;
-    return total;
+    return stencil && stencil->weight ? (total + TXS_OPAQUE - 1) / TXS_OPAQUE : total;
 }
 
 /* Euclidean distance of two normalised histograms (step 4 of [1]) */
@@ -127,6 +139,14 @@ typedef struct txs_learner {
     int step;   /* the canvas is measured on every step-th row */
     int shapes; /* filters and labels may be chosen too        */
 } txs_learner;
+
+/* What counts in the example for a type: cliques that alpha is part of count whole. */
+static txs_stencil txs_stencil_of(const txs_learner *a, const txs_type *t) {
+    const int has_alpha = txs_is_alpha(a->model, t->band) || txs_is_alpha(a->model, t->other);
+    const txs_stencil s = {a->source->mask, has_alpha ? NULL : a->source->weight,
+                           a->source->width};
+    return s;
+}
 
 static txs_type *txs_add_type(txs_level *l, int kind, int band, int other, int dx, int dy) {
     txs_type *t = &l->types[l->type_count++];
@@ -168,6 +188,8 @@ static int txs_find_scale(const txs_learner *a, const txs_type *t) {
     const int members = txs_footprint(t, at);
     uint32_t h[TXS_MAX_RESPONSE + 1] = {0}, count = 0, seen = 0;
     int16_t r[TXS_RESPONSES_TOGETHER];
+    const txs_stencil stencil = txs_stencil_of(a, t);
+    const int is_partial = stencil.mask || stencil.weight;
     txs_find_tails(at, members, s->width, s->height, inside);
     for (int y = inside[1]; y < inside[3]; y += s->step) {
         for (int x = inside[0], n; x < inside[2]; x += n) {
@@ -175,9 +197,10 @@ static int txs_find_scale(const txs_learner *a, const txs_type *t) {
                                                        : (int)TXS_RESPONSES_TOGETHER;
             txs_responses(&s->canvas, t, x, y, n, r);
             for (int i = 0; i < n; i++) {
-                if (s->mask && !txs_is_masked(s->mask, s->width, at, members, x + i, y)) continue;
-                h[abs(r[i])]++;
-                count++;
+                const uint32_t weight =
+                    is_partial ? txs_clique_weight(&stencil, at, members, x + i, y) : 1;
+                h[abs(r[i])] += weight;
+                count += weight;
             }
         }
     }
@@ -264,8 +287,9 @@ static void txs_list_candidates(txs_learner *a, int reach, const float *seen) {
 static void txs_measure_example(void *context, int i) {
     txs_learner *a = (txs_learner *)context;
     txs_candidate *c = &a->candidates[i];
-    int64_t n = txs_measure(&a->source->canvas, a->source->mask, 0, a->source->step,
-                            a->model->bands, a->level, &c->type, c->type.share);
+    const txs_stencil stencil = txs_stencil_of(a, &c->type);
+    int64_t n = txs_measure(&a->source->canvas, &stencil, a->source->step, a->model->bands,
+                            a->level, &c->type, c->type.share);
     int64_t m = (int64_t)a->canvas->width * a->canvas->height / a->step;
     c->noise = n ? txm_float(sqrt(1.0 / (double)n + 1.0 / (double)m)) : 0;
     if (!n) c->weight = 0;
@@ -275,7 +299,7 @@ static void txs_measure_canvas(void *context, int i) {
     txs_learner *a = (txs_learner *)context;
     txs_candidate *c = &a->candidates[i];
     int32_t share[TXS_BINS];
-    txs_measure(a->canvas, NULL, 1, a->step, a->model->bands, a->level, &c->type, share);
+    txs_measure(a->canvas, NULL, a->step, a->model->bands, a->level, &c->type, share);
     c->distance = txs_distance(share, c->type.share);
 }
 
@@ -331,7 +355,8 @@ static void txs_preselect(txs_learner *a) {
     a->level->type_count = 0;
     for (int b = 0; b < bands; b++) {
         txs_type *t = txs_add_type(a->level, TEXSYN_SINGLE, b, b, 0, 0);
-        txs_measure(&a->source->canvas, a->source->mask, 0, 1, bands, a->level, t, t->share);
+        const txs_stencil stencil = txs_stencil_of(a, t);
+        txs_measure(&a->source->canvas, &stencil, 1, bands, a->level, t, t->share);
         txs_make_classes(a->level, b);
     }
     for (int b = 0; b < bands; b++) {
@@ -346,8 +371,9 @@ static void txs_preselect(txs_learner *a) {
     int kept = bands;
     for (int k = bands; k < a->level->type_count; k++) {
         txs_type t = a->level->types[k];
-        if (txs_measure(&a->source->canvas, a->source->mask, 0, a->source->step, bands, a->level,
-                        &t, t.share) > 0)
+        const txs_stencil stencil = txs_stencil_of(a, &t);
+        if (txs_measure(&a->source->canvas, &stencil, a->source->step, bands, a->level, &t,
+                        t.share) > 0)
             a->level->types[kept++] = t; /* an irregular mask may contain none of them */
     }
     a->level->type_count = kept;
