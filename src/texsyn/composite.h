@@ -98,6 +98,8 @@ static txm_status txs_composite_prepare(txs_composer *w, txm_arena *arena, txm_e
     for (int k = 0; k < c->labels; k++)
         txs_ground_find_bands(&g[0], &w->example, k, c->model[k], bytes);
     txs_ground_split(&g[0], &w->example, c->model);
+    if (!txs_ground_show(&g[0], c->model, c->labels, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
     c->levels = 1;
     while (c->levels < TXS_MAX_LEVELS && side >> c->levels >= TXS_COMPOSITE_TOP) {
         const txs_ground *fine = &g[c->levels - 1];
@@ -584,6 +586,7 @@ TEXSYN_API txm_status texsyn_composite_synthesize(const texsyn_composite_desc *d
         txs_composite_painter painter = {desc, &m, &out};
         txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS,
                          txs_composite_paint, &painter);
+        if (c->channels == TXS_MAX_BANDS) status = txm_image_bleed(&out, 0, env);
     }
     txs_mosaic_free(&m, env);
     txm_arena_free(&arena);

@@ -422,27 +422,29 @@ static double txs_band_deviation(const txs_level *l, int band) {
    texture from another photograph then has the light of this one. Alpha stays as it is. */
 static void txs_fill_relight(const txs_filler *f, texsyn_model *m) {
     const int colours = m->channels < 3 ? 1 : 3;
+    const int first = txs_is_alpha(m, 0) && m->bands > 1; /* the first band of colours */
     const txm_image *im = &f->image;
     double mean[3] = {0, 0, 0}, square = 0, along = 0, count = 0;
     for (int y = 0; y < im->height; y++) {
         for (int x = 0; x < im->width; x++) {
-            double band = 0;
+            double band = 0, weight = 1;
             if (f->state[(size_t)y * (size_t)im->width + (size_t)x] != TXS_SOURCE ||
                 (m->channels == 4 && !(txm_image_get(im, x, y, 3) > 0)))
                 continue;
+            if (m->channels == 4) weight = (double)txm_clampf(txm_image_get(im, x, y, 3), 0, 1);
             for (int c = 0; c < colours; c++) {
                 const double v = 255.0 * (double)txm_image_get(im, x, y, c);
-                mean[c] += v;
-                band += (double)m->basis[0][c] * (v - (double)m->mean[c]);
+                mean[c] += weight * v;
+                band += (double)m->basis[first][c] * (v - (double)m->mean[c]);
             }
-            along += band;
-            square += band * band;
-            count++;
+            along += weight * band;
+            square += weight * (band * band);
+            count += weight;
         }
     }
     if (!(count >= (double)TXS_FILL_FEW)) return;
     const double variance = square / count - along / count * (along / count);
-    const double now = txs_band_deviation(&m->level[0], 0);
+    const double now = txs_band_deviation(&m->level[0], first);
     double gain = variance > 0 && now > 0 ? sqrt(variance) / now : 1;
     gain = gain < TXS_FILL_DIMMEST ? TXS_FILL_DIMMEST : gain;
     gain = gain > TXS_FILL_BRIGHTEST ? TXS_FILL_BRIGHTEST : gain;
@@ -497,6 +499,8 @@ static txm_status txs_pane_prepare(const txs_filler *f, txs_pane *p, const texsy
     if (known && levels > known->levels) levels = known->levels;
     if (!known) txs_ground_find_bands(&g[0], &p->view, 0, p->model, p->reached);
     txs_ground_split(&g[0], &p->view, &p->model);
+    if (!txs_ground_show(&g[0], &p->model, 1, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     for (p->levels = 1; p->levels < levels; p->levels++) {
         const txs_ground *fine = &g[p->levels - 1];
         txs_ground *coarse = &g[p->levels];
@@ -725,6 +729,7 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
         if (filler.given && desc->relight) txs_fill_relight(&filler, filler.given);
         status = txs_fill_windows(&filler, &arena, env);
     }
+    if (status == TXM_OK) status = txm_image_bleed(&filler.image, 0, env);
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
     return status;

@@ -111,12 +111,15 @@ static txm_status txs_knit_open(txs_knitter *k, txm_arena *arena, txm_env *env) 
     const texsyn_knit_desc *d = k->desc;
     const size_t entries = (size_t)TXS_NOISE + TXS_VALUES;
     const size_t pixels = txs_pixels_of(d->a.width, d->a.height);
-    k->pair.picture[0] = txm_image_resolve(d->a);
-    k->pair.picture[1] = txm_image_resolve(d->b);
+    txm_status status = txm_image_bled(&d->a, 0, arena, env, &k->pair.picture[0]);
+    if (status == TXM_OK) status = txm_image_bled(&d->b, 0, arena, env, &k->pair.picture[1]);
+    if (status == TXM_OK && d->border.pixels)
+        status = txm_image_bled(&d->border, 0, arena, env, &k->border.picture[0]);
+    if (status != TXM_OK) return status;
     k->pair.width = d->a.width;
     k->pair.height = d->a.height;
     if (d->border.pixels) {
-        k->border.picture[0] = k->border.picture[1] = txm_image_resolve(d->border);
+        k->border.picture[1] = k->border.picture[0];
         k->border.width = d->border.width;
         k->border.height = d->border.height;
     }
@@ -339,9 +342,12 @@ static txm_status txs_loom_source(txs_loom *w, txm_arena *arena, txm_env *env) {
                            (size_t)y * (size_t)width +
                                (size_t)(x + label * (h->width + TXS_KNIT_GAP)));
         }
+    }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    for (int label = 0; label < TXS_KNIT_TWO; label++)
         txs_ground_quantise(g, label, w->model[label]->bands, w->texture[label].level, values,
                             bytes, w->spread[label]);
-    }
     return TXM_OK;
 }
 
@@ -365,6 +371,8 @@ static txm_status txs_loom_canvas(txs_loom *w, txm_arena *arena, txm_env *env) {
         g->label[i] = is_later ? (uint8_t)TXS_NO_LABEL : k->label[in];
         txs_loom_split(w, &done, k->label[in], x, y, g, (size_t)i);
     }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     return TXM_OK;
 }
 
@@ -384,6 +392,8 @@ static txm_status txs_loom_example(txs_loom *w, txm_arena *arena, txm_env *env) 
             txs_loom_split(w, &k->border, g->label[at], x, y, g, at);
         }
     }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example of a border");
     return TXM_OK;
 }
 
@@ -412,6 +422,8 @@ static txm_status txs_loom_invent(txs_loom *w, txm_arena *arena, txm_env *env) {
         g->label[i] = (uint8_t)(mismatch[i] <= most ? label : (int)TXS_NO_LABEL);
         txs_loom_split(w, &k->pair, label, h->left + x, h->top + y, g, (size_t)i);
     }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     return TXM_OK;
 }
 
@@ -617,6 +629,7 @@ TEXSYN_API txm_status texsyn_knit(const texsyn_knit_desc *desc, txm_env *env, tx
         if (is_alike) status = txs_knit_alike(&k, material, env, out);
         else {
             status = txs_knit_different(&k, material, env);
+            if (status == TXM_OK) status = txm_image_bleed(&k.image, 0, env);
             if (status == TXM_OK) txs_copy_picture(&k.image, &out);
         }
     }

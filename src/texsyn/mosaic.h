@@ -12,11 +12,14 @@
 
      label   of all pixels
      sample  of source pixels, TXS_NO_LABEL elsewhere: where target statistics are taken
-     parent  of pixels that have a parent of their own label, TXS_NO_LABEL elsewhere        */
+     parent  of pixels that have a parent of their own label, TXS_NO_LABEL elsewhere
+
+   Where not all colours are visible a last plane has their weights (alpha.h).              */
 typedef struct txs_mosaic {
     txs_canvas canvas;
     int labels, bands;
     ptrdiff_t label, sample, parent; /* from plane 0 to these planes; parent 0 = no parents */
+    ptrdiff_t weight;                /* the same; 0 = all is visible                        */
     const uint8_t *state;            /* of the ground */
 } txs_mosaic;
 
@@ -43,15 +46,17 @@ static int txs_is_free(const txs_mosaic *m, int x, int y) {
    Returns 0 if there is no memory; release it with txs_mosaic_free. */
 static int txs_mosaic_make(txs_mosaic *m, const txm_env *env, const txs_ground *g, int labels,
                            int margin, int has_parents) {
-    const int planes = g->bands * (has_parents ? 2 : 1);
+    const int planes = g->bands * (has_parents ? 2 : 1), has_weights = g->weight != NULL;
     memset(m, 0, sizeof *m);
-    if (!txs_canvas_make(&m->canvas, env, g->width, g->height, margin, planes + 2 + has_parents))
+    if (!txs_canvas_make(&m->canvas, env, g->width, g->height, margin,
+                         planes + 2 + has_parents + has_weights))
         return 0;
     m->labels = labels;
     m->bands = g->bands;
     m->label = planes * m->canvas.plane;
     m->sample = m->label + m->canvas.plane;
     m->parent = has_parents ? m->sample + m->canvas.plane : 0;
+    m->weight = has_weights ? m->sample + (1 + has_parents) * m->canvas.plane : 0;
     m->state = g->state;
     memset(m->canvas.pixels + m->label, TXS_NO_LABEL,
            (size_t)m->canvas.plane * (size_t)(2 + has_parents));
@@ -61,6 +66,7 @@ static int txs_mosaic_make(txs_mosaic *m, const txm_env *env, const txs_ground *
             uint8_t *p = txs_pixel(m, x, y);
             p[m->label] = g->label[i];
             if (g->state[i] == TXS_SOURCE) p[m->sample] = g->label[i];
+            if (has_weights) p[m->weight] = g->weight[i];
         }
     }
     return 1;

@@ -66,6 +66,37 @@ static int txs_is_tail_at(const txs_mosaic *m, const txs_type *t, int32_t at) {
     return txs_is_tail(t, x & 1, y & 1);
 }
 
+/* Does the type say something of colours only, and are some of them hidden in this mosaic? */
+static int txs_is_weighed(const txs_mosaic *m, const texsyn_model *model, const txs_type *t) {
+    return m->weight && !txs_is_alpha(model, t->band) && !txs_is_alpha(model, t->other);
+}
+
+/* Histogram of a clique type of colours over source pixels: a clique counts with the least weight of
+   its members. Returns the number of cliques. */
+static int64_t txs_study_weigh(const txs_mosaic *m, const txs_pixels *tails, int label,
+                               const txs_level *level, const txs_type *t, int32_t share[TXS_BINS]) {
+    const txs_tally y = txs_tally_make(t, level, &m->canvas, m->bands);
+    const txs_guard guard = txs_guard_make(m, t, label, 0, m->sample);
+    int at[4][2], drawn = txs_members(t, at);
+    uint32_t h[TXS_BINS];
+    int64_t total = 0;
+    if (t->kind == TEXSYN_SCALE) drawn = 2; /* the others are of the coarser level */
+    memset(h, 0, sizeof h);
+    for (int i = 0; i < tails->count; i++) {
+        const uint8_t *p = m->canvas.pixels + tails->at[i];
+        if (!txs_holds(&guard, p) || (t->phase && !txs_is_tail_at(m, t, tails->at[i]))) continue;
+        uint32_t least = TXS_OPAQUE;
+        for (int k = 0; k < drawn; k++) {
+            const uint32_t weight = p[m->weight + at[k][1] * m->canvas.stride + at[k][0]];
+            least = weight < least ? weight : least;
+        }
+        h[txs_bin(&y, p)] += least;
+        total += least;
+    }
+    txs_normalise(h, total, share);
+    return (total + TXS_OPAQUE - 1) / TXS_OPAQUE;
+}
+
 /* Histogram of a clique type over its tails, whose label is asked of the plane `labels`. Returns the
    number of cliques. */
 static int64_t txs_study_measure(const txs_mosaic *m, ptrdiff_t labels, const txs_pixels *tails,
@@ -99,7 +130,20 @@ static int64_t txs_study_measure(const txs_mosaic *m, ptrdiff_t labels, const tx
     return total;
 }
 
-/* The same of a crossing type. */
+/* The same of source pixels, and of colours that are visible. */
+static int64_t txs_study_target(const txs_study *s, int label, const txs_type *t,
+                                int32_t share[TXS_BINS]) {
+    const txs_level *level = &s->model[label]->level[s->index];
+    const txs_pixels *tails = &s->tails[label];
+    if (txs_is_weighed(s->source, s->model[label], t)) {
+        const int64_t n = txs_study_weigh(s->source, tails, label, level, t, share);
+        if (n || t->kind != TEXSYN_SINGLE) return n;
+        /* no tail is visible; what they have borrowed will do, since there must be a histogram */
+    }
+    return txs_study_measure(s->source, s->source->sample, tails, label, level, t, share);
+}
+
+/* The same of a crossing type. Colours are counted where they are visible. */
 static int64_t txs_study_measure_crossing(const txs_study *s, const txs_mosaic *m, ptrdiff_t labels,
                                           const txs_pixels *tails, const txs_crossing *c,
                                           int32_t share[TXS_BINS]) {
@@ -107,12 +151,17 @@ static int64_t txs_study_measure_crossing(const txs_study *s, const txs_mosaic *
     const ptrdiff_t d = t->dy * m->canvas.stride + t->dx, plane = m->canvas.plane;
     const uint8_t *tail = s->texture[c->tail].level->classes[t->band];
     const uint8_t *head = s->texture[c->head].level->classes[t->other];
+    const int is_weighed = m->weight && labels == m->sample;
+    const int tail_is_colour = is_weighed && !txs_is_alpha(s->model[c->tail], t->band);
+    const int head_is_colour = is_weighed && !txs_is_alpha(s->model[c->head], t->other);
     uint32_t h[TXS_BINS];
     int64_t total = 0;
     memset(h, 0, sizeof h);
     for (int i = tails->pure; i < tails->count; i++) {
         const uint8_t *p = m->canvas.pixels + tails->at[i], *q = p + d;
-        if (q[labels] != c->head) continue;
+        if (q[labels] != c->head || (tail_is_colour && !p[m->weight]) ||
+            (head_is_colour && !q[m->weight]))
+            continue;
         h[tail[p[t->band * plane]] * TXS_CLASSES + head[q[t->other * plane]]]++;
         total++;
     }
@@ -185,8 +234,7 @@ static void txs_study_preselect(txs_study *s, int label) {
     level->type_count = 0;
     for (int b = 0; b < bands; b++) {
         txs_type *t = txs_add_type(level, TEXSYN_SINGLE, b, b, 0, 0);
-        txs_study_measure(s->source, s->source->sample, &s->tails[label], label, level, t,
-                          t->share);
+        txs_study_target(s, label, t, t->share);
         txs_make_classes(level, b);
     }
     for (int b = 0; b < bands; b++) {
@@ -199,9 +247,7 @@ static void txs_study_preselect(txs_study *s, int label) {
     }
     for (int k = bands; k < level->type_count; k++) {
         txs_type t = level->types[k];
-        if (txs_study_measure(s->source, s->source->sample, &s->tails[label], label, level, &t,
-                              t.share) > 0)
-            level->types[kept++] = t;
+        if (txs_study_target(s, label, &t, t.share) > 0) level->types[kept++] = t;
     }
     level->type_count = kept;
     TEXSYN_ASSERT(kept <= TXS_PRESELECTED);
@@ -239,8 +285,7 @@ static void txs_study_source(void *context, int i) {
     txs_study *s = (txs_study *)context;
     txs_learner *a = &s->learner[s->now];
     txs_candidate *c = &a->candidates[i];
-    const int64_t n = txs_study_measure(s->source, s->source->sample, &s->tails[s->now], s->now,
-                                        a->level, &c->type, c->type.share);
+    const int64_t n = txs_study_target(s, s->now, &c->type, c->type.share);
     const int64_t m = s->free_tails[s->now].count + 1;
     c->noise = n ? txm_float(sqrt(1.0 / (double)n + 1.0 / (double)m)) : 0;
     if (!n) c->weight = 0;

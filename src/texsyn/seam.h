@@ -23,14 +23,17 @@ typedef struct txs_seam {
     uint8_t *mismatch; /* of each node; those outside the picture have 0 */
 } txs_seam;
 
-/* By how much the pictures differ at a pixel, 0..255; what is transparent in both does not. */
+/* By how much the pictures differ at a pixel, 0..255; colours as far as they are visible. */
 static uint8_t txs_mismatch(const txs_pair_of_pictures *p, int x, int y) {
     const int channels = p->picture[0].channels;
-    double sum = 0;
-    if (channels == 4 && !(txs_pair_get(p, 0, x, y, 3) > 0) && !(txs_pair_get(p, 1, x, y, 3) > 0))
-        return 0;
-    for (int c = 0; c < channels; c++)
-        sum += fabs((double)txs_pair_get(p, 0, x, y, c) - (double)txs_pair_get(p, 1, x, y, c));
+    double sum = 0, shown[2] = {1, 1};
+    for (int k = 0; k < 2 && channels == 4; k++)
+        shown[k] = (double)txm_clampf(txs_pair_get(p, k, x, y, 3), 0, 1);
+    for (int c = 0; c < channels; c++) {
+        const double a = (double)txs_pair_get(p, 0, x, y, c);
+        const double b = (double)txs_pair_get(p, 1, x, y, c);
+        sum += c < 3 ? fabs(shown[0] * a - shown[1] * b) : fabs(a - b);
+    }
     const double share = sum / channels;
     return (uint8_t)(share < 1 ? (int)floor(share * 255) : (int)TXS_SEAM_ROUGHEST);
 }

@@ -213,7 +213,8 @@ TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image
     out = txm_image_resolve(out);
     txs_painter painter = {job, &out, job->level < 0 ? 0 : job->level};
     txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS, txs_paint, &painter);
-    return TXM_OK;
+    if (job->desc.model->channels < TXS_MAX_BANDS) return TXM_OK;
+    return txm_image_bleed(&out, job->desc.tileable ? TXM_WRAP_X | TXM_WRAP_Y : 0, env);
 }
 
 TEXSYN_API void texsyn_free(texsyn_job *job) {

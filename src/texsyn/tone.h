@@ -92,20 +92,25 @@ static double txs_tone_value(const txs_tone *t, int x, int y, double mix) {
     return q + mix * ((double)t->at[i] - q) + (1 - mix) * (double)t->grain[i];
 }
 
+/* Does the pixel have the state, and is it not a hidden colour? */
+static int txs_tone_counts(const txs_tone *t, int x, int y, int state) {
+    const txs_ground *g = t->ground;
+    const size_t i = txs_tone_index(t, x, y);
+    if (g->state[i] != state) return 0;
+    return state == TXS_FREE || !g->weight || g->alpha[t->label] == t->band || g->weight[i];
+}
+
 /* Mean difference of neighbours that both have a state; negative if there are none. */
 static double txs_tone_roughness(const txs_tone *t, int state, double mix) {
     double sum = 0;
     int64_t count = 0;
     for (int y = 0; y < t->ground->height; y++) {
         for (int x = 0; x < t->ground->width; x++) {
-            if (!txs_tone_has(t, x, y) || t->ground->state[txs_tone_index(t, x, y)] != state)
-                continue;
+            if (!txs_tone_has(t, x, y) || !txs_tone_counts(t, x, y, state)) continue;
             const double value = txs_tone_value(t, x, y, mix);
             for (int k = 0; k < 2; k++) {
                 const int nx = x + !k, ny = y + k;
-                if (!txs_tone_has(t, nx, ny) ||
-                    t->ground->state[txs_tone_index(t, nx, ny)] != state)
-                    continue;
+                if (!txs_tone_has(t, nx, ny) || !txs_tone_counts(t, nx, ny, state)) continue;
                 sum += fabs(txs_tone_value(t, nx, ny, mix) - value);
                 count++;
             }
