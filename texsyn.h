@@ -68,6 +68,8 @@
      (corners, parallel differences, differences together with those of the coarser level), for what
      pairs cannot express; and for contours there are filters of 12 to 18 pixels and differences
      beside a label of the coarser level, which says how that changes and curves.
+     The colour of transparent pixels is never looked at: statistics of colours count what is
+     visible, weighted by alpha, and hidden colour of results continues the visible one.
      texsyn_fill does the same in a hole, with the surroundings fixed: it learns from the known pixels
      near the hole on the canvas of the hole itself.
 
@@ -289,8 +291,8 @@ typedef struct texsyn_fill_desc {
    removal). Holes are filled in windows of at most 256 x 256 pixels of hole.
 
    env    NULL, or how to allocate, report and spread the work
-   out    form of the image, may be the image itself: known pixels are copied, with the same bytes.
-          Untouched after an error
+   out    form of the image, may be the image itself: known pixels are copied, with the same bytes,
+          but for hidden colour. Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a mask
           that is empty or covers all, known samples that are not finite or beyond a million;
           TXM_TOO_SMALL if fewer than 256 pixels can be learned from; TXM_TOO_LARGE above
@@ -337,7 +339,7 @@ typedef struct texsyn_knit_desc {
 
    env    NULL, or how to allocate, report and spread the work
    out    form of a, may be a or b itself: outside the zone of the (displaced) border it has the bytes
-          of a or b. Untouched after an error
+          of a or b, but for hidden colour. Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a layout
           that is all black or all white, samples that are not finite or beyond a million;
           TXM_TOO_SMALL for pictures under 16 x 16, fewer than 256 pixels outside the zone, or an
@@ -555,7 +557,8 @@ TEXSYN_API float texsyn_erosion_share(const texsyn_erosion *erosion);
    picture  of the erosion's size, 1 to 4 channels; alpha is kept
    out      the caller's, of the same size and channels, also the picture itself; untouched after an
             error
-   return   TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY (for three rows)          */
+   return   TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY (for three rows, and for a
+            copy of the picture if colour is hidden in it)                                     */
 TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float level,
                                           const txm_image *levels, const txm_image *picture,
                                           txm_env *env, txm_image out);
@@ -660,6 +663,166 @@ enum {
 static const uint8_t txs_difference_class[TXS_DIFFERENCES + 1] = {
     0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 4,
     5, 5, 6, 6, 6, 7, 7, 7, 7, 7, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8};
+
+/* ---- pictures and masks ----------------------------------------------------------------- */
+
+static size_t txs_pixels_of(int width, int height) {
+    return (size_t)width * (size_t)height;
+}
+
+/* Copy rows from one picture to another of the same form. */
+static void txs_copy_picture(const txm_image *from, const txm_image *to) {
+    const txm_image a = txm_image_resolve(*from), b = txm_image_resolve(*to);
+    const size_t row = (size_t)a.width * (size_t)a.channels * txm_sample_bytes(a.sample);
+    for (int y = 0; y < a.height; y++)
+        memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
+}
+
+/* gray times alpha is at least half: the rule for masks */
+static int txs_is_white(const txm_image *mask, int x, int y) {
+    const txm_image m = txm_image_resolve(*mask);
+    double v = (double)txm_image_get(&m, x, y, 0);
+    if (m.channels >= 3)
+        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
+    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
+    return v >= 0.5;
+}
+
+/* no float sample is NaN or larger than LIMITS says */
+static int txs_image_is_moderate(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
+        const float *row = (const float *)txm_image_row_const(&im, y);
+        for (size_t i = 0; i < (size_t)im.width * (size_t)im.channels; i++)
+            if (!txm_is_finite((double)row[i]) || !(fabsf(row[i]) <= 1e6f)) return 0;
+    }
+    return 1;
+}
+
+static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
+                                 txm_env *env) {
+    if (!mask->pixels) return TXM_OK;
+    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    if (mask->width != image->width || mask->height != image->height)
+        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name, "must be # x # like its picture",
+                                   (uint64_t)image->width, (uint64_t)image->height);
+    if (!txm_image_is_finite(mask))
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
+    return TXM_OK;
+}
+
+/* ---- alpha of an example ------------------------------------------------------------------
+
+   The colour of a transparent pixel is unknown, so it must not enter any statistics. The weight of
+   a colour is its alpha in steps; cliques of colours are counted with the least weight of their
+   pixels. Cliques of colours and alpha are counted everywhere, and there hidden pixels borrow the
+   colour of a visible one that lies elsewhere: then colour and transparency are independent, the
+   statistics of colour are the same all over the picture, and a synthesised picture has the texture
+   of what is visible everywhere, of which its alpha shows a part.                             */
+
+enum {
+    TXS_OPAQUE = 15,  /* the largest weight: small, so that 32 bits hold the counts */
+    TXS_LENDERS = 24  /* places that are tried before any visible pixel will do     */
+};
+
+/* The weight of a colour whose alpha is that: 0 only if it is hidden. */
+static uint8_t txs_weight_of(double alpha) {
+    return (uint8_t)(alpha > 0 ? (alpha < 1 ? ceil(alpha * TXS_OPAQUE) : (int)TXS_OPAQUE) : 0);
+}
+
+/* The weights of a picture's pixels. mask: NULL, or a byte for each pixel, 0 where it does not
+   count; its weight is 0. Returns 0 if all that count are opaque, so that there is no need of
+   weights. */
+static int txs_weigh(const txm_image *im, const uint8_t *mask, uint8_t *weight) {
+    int differ = 0;
+    if (im->channels != 4) return 0;
+    for (int y = 0; y < im->height; y++) {
+        for (int x = 0; x < im->width; x++) {
+            const size_t i = (size_t)y * (size_t)im->width + (size_t)x;
+            weight[i] = txs_weight_of((double)txm_image_get(im, x, y, 3));
+            if (mask && !mask[i]) weight[i] = 0;
+            else differ |= weight[i] != TXS_OPAQUE;
+        }
+    }
+    return differ;
+}
+
+/* ---- hidden colour of results ------------------------------------------------------------ */
+
+/* Where a picture is to be painted: out itself, or a picture of that form in the arena if alpha can
+   hide colours, which then are bled; *to receives it. */
+static txm_status txs_easel(const txm_image *out, int can_hide, txm_arena *arena, txm_env *env,
+                            txm_image *to) {
+    *to = txm_image_resolve(*out);
+    if (!can_hide) return TXM_OK;
+    to->stride = 0;
+    *to = txm_image_resolve(*to);
+    to->pixels = txm_arena_alloc(arena, (size_t)to->height, (size_t)to->stride);
+    return to->pixels ? TXM_OK : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a picture");
+}
+
+/* What was painted becomes the result: hidden colours are bled. */
+static txm_status txs_hang(const txm_image *painted, const txm_image *out, int wrap, txm_env *env) {
+    if (painted->pixels == out->pixels) return TXM_OK;
+    const txm_status status = txm_image_bleed(painted, wrap, env);
+    if (status == TXM_OK) txs_copy_picture(painted, out);
+    return status;
+}
+
+/* ---- borrowed colours -------------------------------------------------------------------- */
+
+/* Who lends colours: visible pixels, and some places that are the same for all that borrow. */
+typedef struct txs_lenders {
+    const uint8_t *weight; /* of each pixel, not 0 where it can lend */
+    int width, height;
+    const uint32_t *visible; /* those that can lend */
+    uint32_t count;
+    size_t place[TXS_LENDERS][2];
+} txs_lenders;
+
+static txs_lenders txs_lenders_of(const uint8_t *weight, int width, int height,
+                                  const uint32_t *visible, uint32_t count) {
+    txs_lenders l;
+    txm_rng rng = txm_rng_make(1, 0);
+    memset(&l, 0, sizeof l);
+    l.weight = weight;
+    l.width = width;
+    l.height = height;
+    l.visible = visible;
+    l.count = count;
+    for (int k = 0; k < TXS_LENDERS; k++) {
+        l.place[k][0] = txm_rng_below(&rng, (uint32_t)width);
+        l.place[k][1] = txm_rng_below(&rng, (uint32_t)height);
+    }
+    return l;
+}
+
+/* Where hidden pixel i borrows its colour: the first visible one of the places, so that neighbours
+   mostly borrow neighbours; else any visible one. There must be one. */
+static size_t txs_lender(const txs_lenders *l, size_t i) {
+    const size_t w = (size_t)l->width, h = (size_t)l->height;
+    for (int k = 0; k < TXS_LENDERS; k++) {
+        const size_t x = (i % w + l->place[k][0]) % w, y = (i / w + l->place[k][1]) % h;
+        if (l->weight[y * w + x]) return y * w + x;
+    }
+    txm_rng rng = txm_rng_make(i, 1);
+    return l->visible[txm_rng_below(&rng, l->count)];
+}
+
+/* Give the hidden pixels of a plane of colours those of visible ones, or 0 if there are none.
+   visible: scratch, a number for each pixel. Returns how many are visible. */
+static uint32_t txs_borrow(float *plane, const uint8_t *weight, int width, int height,
+                           uint32_t *visible) {
+    const size_t pixels = txs_pixels_of(width, height);
+    uint32_t count = 0;
+    for (size_t i = 0; i < pixels; i++)
+        if (weight[i]) visible[count++] = (uint32_t)i;
+    const txs_lenders lenders = txs_lenders_of(weight, width, height, visible, count);
+    for (size_t i = 0; i < pixels; i++)
+        if (!weight[i]) plane[i] = count ? plane[txs_lender(&lenders, i)] : 0;
+    return count;
+}
 
 /* ---- private types ---------------------------------------------------------------------- */
 
@@ -2026,33 +2189,56 @@ typedef struct txs_source { /* one level of the example */
     int width, height;
     float *value;      /* planes                                               */
     uint8_t *mask;     /* non-zero: belongs to the texture; NULL = all do      */
+    uint8_t *weight;   /* of colours, see alpha.h; NULL = all are visible      */
     txs_canvas canvas; /* quantised, margin 0                                  */
     int step;          /* statistics are taken from every step-th row          */
 } txs_source;
 
-/* Principal components of the colours inside the mask. Rounded as the model file keeps them. */
-static void txs_find_bands(texsyn_model *m, const txm_image *im, const txs_source *s) {
+/* Is it the band of alpha? */
+static int txs_is_alpha(const texsyn_model *m, int band) {
+    return m->channels == 4 && m->basis[band][3] != 0;
+}
+
+/* Alpha becomes the first band, the one whose shapes are learned. */
+static void txs_put_alpha_first(texsyn_model *m) {
+    for (int b = m->bands - 1; b > 0; b--) {
+        if (!txs_is_alpha(m, b)) continue;
+        float row[TXS_MAX_BANDS];
+        memcpy(row, m->basis[b], sizeof row);
+        memcpy(m->basis[b], m->basis[b - 1], sizeof row);
+        memcpy(m->basis[b - 1], row, sizeof row);
+    }
+}
+
+/* Principal components of the visible colours inside the mask. Rounded as the model file keeps
+   them. Alpha is the last band, if it varies. Returns non-zero if it varies more than any colour. */
+static int txs_find_bands(texsyn_model *m, const txm_image *im, const txs_source *s) {
     const int colours = m->channels < 3 ? 1 : 3;
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     double mean[4] = {0, 0, 0, 0}, square[4] = {0, 0, 0, 0}, cov[6] = {0, 0, 0, 0, 0, 0};
-    double values[3], vectors[3][3], count = 0;
+    double values[3], vectors[3][3], count = 0, visible = 0;
     for (int pass = 0; pass < 2; pass++) {
         for (size_t i = 0; i < pixels; i++) {
             double x[4];
             if (s->mask && !s->mask[i]) continue;
+            const double weight = s->weight ? (double)s->weight[i] : 1;
             for (int c = 0; c < m->channels; c++)
                 x[c] = 255.0 * (double)txm_image_get(im, (int)(i % (size_t)s->width),
                                                      (int)(i / (size_t)s->width), c) -
                        mean[c];
-            for (int c = 0; c < m->channels && !pass; c++) square[c] += x[c];
+            for (int c = 0; c < m->channels && !pass; c++)
+                square[c] += c < 3 ? weight * x[c] : x[c];
             count += !pass;
-            for (int c = 0, k = 0; c < 3 && pass; c++)
+            visible += pass ? 0 : weight;
+            for (int c = 0, k = 0; c < 3 && pass && visible > 0; c++)
                 for (int d = c; d < 3; d++, k++)
-                    if (d < colours) cov[k] += x[c] * x[d] / count;
+                    if (d < colours) cov[k] += weight * (x[c] * x[d]) / visible;
             if (pass && m->channels == 4) square[3] += x[3] * x[3] / count;
         }
         for (int c = 0; c < m->channels && !pass; c++) {
-            mean[c] = (double)(m->mean[c] = txs_short_float((float)(square[c] / count)));
+            const double total = c < 3 ? visible : count;
+            m->mean[c] = txs_short_float((float)(total > 0 ? square[c] / total : 0));
+            mean[c] = (double)m->mean[c];
             square[c] = 0;
         }
     }
@@ -2066,6 +2252,7 @@ static void txs_find_bands(texsyn_model *m, const txm_image *im, const txs_sourc
         m->bands++;
     }
     if (m->channels == 4 && square[3] >= 0.05) m->basis[m->bands++][3] = 1;
+    return square[3] > values[0];
 }
 
 /* The bands of the example at full resolution. */
@@ -2084,20 +2271,46 @@ static void txs_split(const texsyn_model *m, const txm_image *im, txs_source *s)
     }
 }
 
+/* The mean of 2 x 2 colours as far as they are visible. */
+static float txs_visible_mean(const float *p, const uint8_t *weight, size_t row) {
+    const size_t at[4] = {0, 1, row, row + 1};
+    double sum = 0, total = 0;
+    for (int k = 0; k < 4; k++) {
+        sum += (double)weight[at[k]] * (double)p[at[k]];
+        total += weight[at[k]];
+    }
+    return txm_float(sum / total);
+}
+
+/* The weight of a coarser pixel; not 0 where anything is visible. */
+static uint8_t txs_mean_weight(const uint8_t *weight, size_t row) {
+    const int sum = weight[0] + weight[1] + weight[row] + weight[row + 1];
+    return (uint8_t)(sum > 0 && sum < 4 ? 1 : sum / 4);
+}
+
 /* The next coarser level: means of 2 x 2; a pixel belongs to the texture if all four do. */
-static void txs_halve(const txs_source *fine, txs_source *s, int bands) {
+static void txs_halve(const txs_source *fine, txs_source *s, const texsyn_model *m) {
     const size_t w = (size_t)fine->width;
     float *out = s->value;
-    for (int b = 0; b < bands; b++) {
+    for (int b = 0; b < m->bands; b++) {
         const float *plane = fine->value + (size_t)b * w * (size_t)fine->height;
+        const uint8_t *weights = txs_is_alpha(m, b) ? NULL : fine->weight;
         for (int y = 0; y < s->height; y++) {
             for (int x = 0; x < s->width; x++) {
-                const float *p = plane + (size_t)(2 * y) * w + 2 * (size_t)x;
-                *out++ =
-                    txm_float(((double)p[0] + (double)p[1] + (double)p[w] + (double)p[w + 1]) / 4);
+                const size_t at = (size_t)(2 * y) * w + 2 * (size_t)x;
+                const float *p = plane + at;
+                if (weights && txs_mean_weight(weights + at, w))
+                    *out++ = txs_visible_mean(p, weights + at, w);
+                else
+                    *out++ = txm_float(
+                        ((double)p[0] + (double)p[1] + (double)p[w] + (double)p[w + 1]) / 4);
             }
         }
     }
+    for (int y = 0; y < s->height && s->weight; y++)
+        for (int x = 0; x < s->width; x++)
+            s->weight[(size_t)y * (size_t)s->width + (size_t)x] =
+                txs_mean_weight(fine->weight + (size_t)(2 * y) * w + 2 * (size_t)x, w);
     for (int y = 0; y < s->height && s->mask; y++) {
         for (int x = 0; x < s->width; x++) {
             const uint8_t *p = fine->mask + (size_t)(2 * y) * w + 2 * (size_t)x;
@@ -2116,9 +2329,16 @@ static double txs_value(const txs_level *l, int band, double q) {
     return (double)l->low[band] + q * (double)l->step[band];
 }
 
+/* How much pixel i of a band counts. */
+static size_t txs_count_of(const txs_source *s, const uint8_t *weight, size_t i) {
+    if (s->mask && !s->mask[i]) return 0;
+    return weight ? weight[i] : 1;
+}
+
 /* Choose the quantisation of a band: 32 steps between the 0.1 and 99.9 percentiles, but no finer
-   than one gray level; and quantise. Returns the share of a step that the values fill. */
-static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
+   than one gray level; and quantise. weight: of the pixels, or NULL. Returns the share of a step
+   that the values fill. */
+static float txs_quantise_band(txs_level *l, int band, txs_source *s, const uint8_t *weight) {
     enum { FINE = 4096 };
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     const float *v = s->value + (size_t)band * pixels;
@@ -2126,15 +2346,18 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     double low = 1e300, high = -1e300;
     size_t count = 0, seen = 0, histogram[FINE] = {0};
     for (size_t i = 0; i < pixels; i++) {
-        if (s->mask && !s->mask[i]) continue;
+        const size_t counts = txs_count_of(s, weight, i);
+        if (!counts) continue;
         low = (double)v[i] < low ? (double)v[i] : low;
         high = (double)v[i] > high ? (double)v[i] : high;
-        count++;
+        count += counts;
     }
     const double bin = (high - low) / (double)FINE;
-    for (size_t i = 0; i < pixels && bin > 0; i++)
-        if (!s->mask || s->mask[i])
-            histogram[txm_clampi((int)(((double)v[i] - low) / bin), 0, FINE - 1)]++;
+    for (size_t i = 0; i < pixels && bin > 0; i++) {
+        const size_t counts = txs_count_of(s, weight, i);
+        if (counts)
+            histogram[txm_clampi((int)(((double)v[i] - low) / bin), 0, FINE - 1)] += counts;
+    }
     double from = low, to = high;
     for (int i = 0; i < FINE && bin > 0; i++) {
         if (seen <= count / 1000) from = low + bin * i;
@@ -2151,7 +2374,7 @@ static float txs_quantise_band(txs_level *l, int band, txs_source *s) {
     for (size_t i = 0; i < pixels; i++) {
         q[i] = (uint8_t)txs_quantise(l, band, (double)v[i]);
         double off = ((double)v[i] - txs_value(l, band, q[i])) / (double)l->step[band];
-        if ((!s->mask || s->mask[i]) && fabs(off) <= 0.5) spread += off * off;
+        if (fabs(off) <= 0.5) spread += (double)txs_count_of(s, weight, i) * (off * off);
     }
     double fill = sqrt(12 * spread / (double)count); /* 1 if evenly spread over the steps */
     return (float)floor((fill > 1 ? 1 : fill) * 255 + 0.5) / 255;
@@ -2239,8 +2462,10 @@ static void txs_fill_labels(const txs_level *level, txs_canvas *canvas, int band
     txs_wrap(canvas, 2 * bands);
 }
 
-/* Choose the limits of the labels: thirds of the example. Returns 0 if there is no memory. */
-static int txs_cut_labels(txs_level *level, const txs_source *s, int bands, txm_arena *arena) {
+/* Choose the limits of the labels: thirds of the example. weight: of the first band, or NULL.
+   Returns 0 if there is no memory. */
+static int txs_cut_labels(txs_level *level, const txs_source *s, const uint8_t *weight, int bands,
+                          txm_arena *arena) {
     enum { CURVES = 8 * TXS_VALUES + 1 };
     uint32_t *gradients =
         (uint32_t *)txm_arena_zero(arena, TXS_MAX_GRADIENT + 1, sizeof *gradients);
@@ -2249,7 +2474,8 @@ static int txs_cut_labels(txs_level *level, const txs_source *s, int bands, txm_
     for (int y = 0; y < s->height; y++) {
         for (int x = 0; x < s->width; x++) {
             int gradient, curve;
-            if (s->mask && !s->mask[(size_t)y * (size_t)s->width + (size_t)x]) continue;
+            const size_t i = (size_t)y * (size_t)s->width + (size_t)x;
+            if ((s->mask && !s->mask[i]) || (weight && !weight[i])) continue;
             txs_look_at(&s->canvas, bands, x, y, &gradient, &curve);
             gradients[gradient]++;
             curves[curve + CURVES / 2]++;
@@ -2314,43 +2540,55 @@ static void txs_find_tails(int at[TXS_MAX_MEMBERS][2], int members, int width, i
     }
 }
 
-/* Do all members of the clique at (x, y) belong to the texture? */
-static int txs_is_masked(const uint8_t *mask, int width, int at[TXS_MAX_MEMBERS][2], int members,
-                         int x, int y) {
-    int all = 1;
-    for (int i = 0; i < members; i++)
-        all &= mask[(ptrdiff_t)(y + at[i][1]) * width + x + at[i][0]] != 0;
-    return all;
+/* Which pixels of an example count: those inside the mask; with weights, by the least weight of a
+   clique's members. */
+typedef struct txs_stencil {
+    const uint8_t *mask, *weight; /* a byte for each pixel; NULL = all are inside, or weigh 1 */
+    int width;
+} txs_stencil;
+
+/* How much the clique at (x, y) counts. */
+static uint32_t txs_clique_weight(const txs_stencil *s, int at[TXS_MAX_MEMBERS][2], int members,
+                                  int x, int y) {
+    uint32_t least = s->weight ? (uint32_t)TXS_OPAQUE : 1;
+    for (int i = 0; i < members; i++) {
+        const ptrdiff_t p = (ptrdiff_t)(y + at[i][1]) * s->width + x + at[i][0];
+        if (s->mask && !s->mask[p]) least = 0;
+        if (s->weight && s->weight[p] < least) least = s->weight[p];
+    }
+    return least;
 }
 
-/* Histogram of a clique type over a canvas: of the example, cliques that lie inside image and
-   mask; of a synthesised canvas (wrap) all of them. Every step-th row. Returns the number of
+/* Histogram of a clique type over a canvas: of the example (stencil), cliques that lie inside it and
+   count; of a synthesised canvas (NULL) all of them. Every step-th row. Returns the number of
    cliques; share[] sums to about TXS_ONE. */
-static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, int step, int bands,
+static int64_t txs_measure(const txs_canvas *c, const txs_stencil *stencil, int step, int bands,
                            const txs_level *level, const txs_type *t, int32_t share[TXS_BINS]) {
+    const int is_partial = stencil && (stencil->mask || stencil->weight);
     int at[TXS_MAX_MEMBERS][2], inside[4] = {0, 0, c->width, c->height};
     const int members = txs_footprint(t, at);
     uint32_t h[2][TXS_BINS + 15];
     const txs_tally y = txs_tally_make(t, level, c, bands);
     int64_t total = 0;
     memset(h, 0, sizeof h);
-    if (!wrap) txs_find_tails(at, members, c->width, c->height, inside);
+    if (stencil) txs_find_tails(at, members, c->width, c->height, inside);
     const int x0 = inside[0], y0 = inside[1], x1 = inside[2], y1 = inside[3];
     uint8_t class_of[2 * TXS_MAX_RESPONSE + 1];
     if (t->kind == TEXSYN_FILTER) txs_response_classes(t->scale, class_of);
     for (int row = y0; row < y1; row += step) {
         const uint8_t *p = txs_at(c, 0, 0, row);
-        if (mask || t->phase) {
+        if (is_partial || t->phase) {
             for (int x = x0; x < x1; x++) {
-                if (!txs_is_tail(t, x, row) ||
-                    (mask && !txs_is_masked(mask, c->width, at, members, x, row)))
-                    continue;
+                if (!txs_is_tail(t, x, row)) continue;
+                const uint32_t weight =
+                    is_partial ? txs_clique_weight(stencil, at, members, x, row) : 1;
+                if (!weight) continue;
                 if (t->kind == TEXSYN_FILTER) {
                     int16_t r;
                     txs_responses(c, t, x, row, 1, &r);
-                    h[0][class_of[r + TXS_MAX_RESPONSE]]++;
+                    h[0][class_of[r + TXS_MAX_RESPONSE]] += weight;
                 } else {
-                    h[0][txs_bin(&y, p + x)]++;
+                    h[0][txs_bin(&y, p + x)] += weight;
                 }
             }
         } else if (t->kind == TEXSYN_FILTER) {
@@ -2374,7 +2612,7 @@ static int64_t txs_measure(const txs_canvas *c, const uint8_t *mask, int wrap, i
     for (int i = 0; i < TXS_BINS; i++)
         share[i] =
             total ? (int32_t)(((int64_t)(h[0][i] + h[1][i]) * TXS_ONE + total / 2) / total) : 0;
-    return total;
+    return stencil && stencil->weight ? (total + TXS_OPAQUE - 1) / TXS_OPAQUE : total;
 }
 
 /* Euclidean distance of two normalised histograms (step 4 of [1]) */
@@ -2406,6 +2644,14 @@ typedef struct txs_learner {
     int step;   /* the canvas is measured on every step-th row */
     int shapes; /* filters and labels may be chosen too        */
 } txs_learner;
+
+/* What counts in the example for a type: cliques that alpha is part of count whole. */
+static txs_stencil txs_stencil_of(const txs_learner *a, const txs_type *t) {
+    const int has_alpha = txs_is_alpha(a->model, t->band) || txs_is_alpha(a->model, t->other);
+    const txs_stencil s = {a->source->mask, has_alpha ? NULL : a->source->weight,
+                           a->source->width};
+    return s;
+}
 
 static txs_type *txs_add_type(txs_level *l, int kind, int band, int other, int dx, int dy) {
     txs_type *t = &l->types[l->type_count++];
@@ -2447,6 +2693,8 @@ static int txs_find_scale(const txs_learner *a, const txs_type *t) {
     const int members = txs_footprint(t, at);
     uint32_t h[TXS_MAX_RESPONSE + 1] = {0}, count = 0, seen = 0;
     int16_t r[TXS_RESPONSES_TOGETHER];
+    const txs_stencil stencil = txs_stencil_of(a, t);
+    const int is_partial = stencil.mask || stencil.weight;
     txs_find_tails(at, members, s->width, s->height, inside);
     for (int y = inside[1]; y < inside[3]; y += s->step) {
         for (int x = inside[0], n; x < inside[2]; x += n) {
@@ -2454,9 +2702,10 @@ static int txs_find_scale(const txs_learner *a, const txs_type *t) {
                                                        : (int)TXS_RESPONSES_TOGETHER;
             txs_responses(&s->canvas, t, x, y, n, r);
             for (int i = 0; i < n; i++) {
-                if (s->mask && !txs_is_masked(s->mask, s->width, at, members, x + i, y)) continue;
-                h[abs(r[i])]++;
-                count++;
+                const uint32_t weight =
+                    is_partial ? txs_clique_weight(&stencil, at, members, x + i, y) : 1;
+                h[abs(r[i])] += weight;
+                count += weight;
             }
         }
     }
@@ -2543,8 +2792,9 @@ static void txs_list_candidates(txs_learner *a, int reach, const float *seen) {
 static void txs_measure_example(void *context, int i) {
     txs_learner *a = (txs_learner *)context;
     txs_candidate *c = &a->candidates[i];
-    int64_t n = txs_measure(&a->source->canvas, a->source->mask, 0, a->source->step,
-                            a->model->bands, a->level, &c->type, c->type.share);
+    const txs_stencil stencil = txs_stencil_of(a, &c->type);
+    int64_t n = txs_measure(&a->source->canvas, &stencil, a->source->step, a->model->bands,
+                            a->level, &c->type, c->type.share);
     int64_t m = (int64_t)a->canvas->width * a->canvas->height / a->step;
     c->noise = n ? txm_float(sqrt(1.0 / (double)n + 1.0 / (double)m)) : 0;
     if (!n) c->weight = 0;
@@ -2554,7 +2804,7 @@ static void txs_measure_canvas(void *context, int i) {
     txs_learner *a = (txs_learner *)context;
     txs_candidate *c = &a->candidates[i];
     int32_t share[TXS_BINS];
-    txs_measure(a->canvas, NULL, 1, a->step, a->model->bands, a->level, &c->type, share);
+    txs_measure(a->canvas, NULL, a->step, a->model->bands, a->level, &c->type, share);
     c->distance = txs_distance(share, c->type.share);
 }
 
@@ -2610,7 +2860,8 @@ static void txs_preselect(txs_learner *a) {
     a->level->type_count = 0;
     for (int b = 0; b < bands; b++) {
         txs_type *t = txs_add_type(a->level, TEXSYN_SINGLE, b, b, 0, 0);
-        txs_measure(&a->source->canvas, a->source->mask, 0, 1, bands, a->level, t, t->share);
+        const txs_stencil stencil = txs_stencil_of(a, t);
+        txs_measure(&a->source->canvas, &stencil, 1, bands, a->level, t, t->share);
         txs_make_classes(a->level, b);
     }
     for (int b = 0; b < bands; b++) {
@@ -2625,8 +2876,9 @@ static void txs_preselect(txs_learner *a) {
     int kept = bands;
     for (int k = bands; k < a->level->type_count; k++) {
         txs_type t = a->level->types[k];
-        if (txs_measure(&a->source->canvas, a->source->mask, 0, a->source->step, bands, a->level,
-                        &t, t.share) > 0)
+        const txs_stencil stencil = txs_stencil_of(a, &t);
+        if (txs_measure(&a->source->canvas, &stencil, a->source->step, bands, a->level, &t,
+                        t.share) > 0)
             a->level->types[kept++] = t; /* an irregular mask may contain none of them */
     }
     a->level->type_count = kept;
@@ -3254,46 +3506,6 @@ TEXSYN_API int texsyn_clique_at(const texsyn_model *model, int index, texsyn_cli
     return 0;
 }
 
-/* ---- pictures and masks ----------------------------------------------------------------- */
-
-static size_t txs_pixels_of(int width, int height) {
-    return (size_t)width * (size_t)height;
-}
-
-/* gray times alpha is at least half: the rule for masks */
-static int txs_is_white(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    double v = (double)txm_image_get(&m, x, y, 0);
-    if (m.channels >= 3)
-        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
-    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
-    return v >= 0.5;
-}
-
-/* no float sample is NaN or larger than LIMITS says */
-static int txs_image_is_moderate(const txm_image *image) {
-    const txm_image im = txm_image_resolve(*image);
-    for (int y = 0; y < im.height && im.sample == TXM_F32; y++) {
-        const float *row = (const float *)txm_image_row_const(&im, y);
-        for (size_t i = 0; i < (size_t)im.width * (size_t)im.channels; i++)
-            if (!txm_is_finite((double)row[i]) || !(fabsf(row[i]) <= 1e6f)) return 0;
-    }
-    return 1;
-}
-
-static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
-                                 txm_env *env) {
-    if (!mask->pixels) return TXM_OK;
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name, "must be # x # like its picture",
-                                   (uint64_t)image->width, (uint64_t)image->height);
-    if (!txm_image_is_finite(mask))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
-    return TXM_OK;
-}
-
 /* ---- public: learning ------------------------------------------------------------------- */
 
 static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
@@ -3326,6 +3538,33 @@ static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
     return TXM_OK;
 }
 
+/* Bands of the example at full resolution; hidden pixels get borrowed colours. s->weight: room for
+   the weights, set to NULL if there is no need of them. Returns 0 if there is no memory. */
+static int txs_split_visible(texsyn_model *m, const txm_image *im, txs_source *s,
+                             txm_arena *arena) {
+    const size_t pixels = (size_t)s->width * (size_t)s->height;
+    if (s->weight && !txs_weigh(im, s->mask, s->weight)) s->weight = NULL;
+    if (txs_find_bands(m, im, s) && s->weight) txs_put_alpha_first(m);
+    txs_split(m, im, s);
+    if (!s->weight) return 1;
+    uint32_t visible = 0, *list = (uint32_t *)txm_arena_alloc(arena, pixels, sizeof *list);
+    for (int b = 0; b < m->bands && list; b++)
+        if (!txs_is_alpha(m, b))
+            visible = txs_borrow(s->value + (size_t)b * pixels, s->weight, s->width, s->height, list);
+    if (!visible) s->weight = NULL;
+    return list != NULL;
+}
+
+/* Are there enough pixels inside the mask, and a visible one? */
+static int txs_is_enough(const txs_source *s) {
+    const size_t pixels = (size_t)s->width * (size_t)s->height;
+    size_t inside = 0, visible = 0;
+    for (size_t i = 0; i < pixels && s->mask; i++) inside += s->mask[i] != 0;
+    for (size_t i = 0; i < pixels && s->weight; i++)
+        visible += (!s->mask || s->mask[i]) && s->weight[i];
+    return (!s->mask || inside >= 256) && (!s->weight || visible);
+}
+
 /* Split the example into levels of quantised bands. */
 static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, txs_source *source,
                               txm_arena *arena, txm_env *env) {
@@ -3344,6 +3583,7 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->step = (int)(pixels / (1 << 17)) | 1;
         s->value = (float *)txm_arena_alloc(arena, pixels * (size_t)m->channels, sizeof(float));
         if (desc->mask.pixels) s->mask = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+        if (m->channels == 4) s->weight = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
         s->canvas.width = s->width;
         s->canvas.height = s->height;
         s->canvas.stride = s->width;
@@ -3359,26 +3599,26 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
             if (s->mask && seen < 256)
                 return txm_fail(env, TXM_TOO_SMALL,
                                 "mask: fewer than 256 pixels (16 x 16) are not 0");
-            txs_find_bands(m, im, s);
-            txs_split(m, im, s);
+            if (!txs_split_visible(m, im, s, arena))
+                return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         } else {
-            txs_halve(&source[i - 1], s, m->bands);
-            size_t seen = 0;
-            for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
-            if (s->mask && seen < 256) {
-                m->levels = i; /* too little of an irregular region is left at this level */
+            if (!source[i - 1].weight) s->weight = NULL;
+            txs_halve(&source[i - 1], s, m);
+            if (!txs_is_enough(s)) { /* too little of an irregular region is left at this level */
+                m->levels = i;
                 break;
             }
         }
         for (int b = 0; b < m->bands; b++) {
-            float fill = txs_quantise_band(&m->level[i], b, s);
+            float fill = txs_quantise_band(&m->level[i], b, s, txs_is_alpha(m, b) ? NULL : s->weight);
             if (i == 0) m->dither[b] = fill;
         }
     }
     for (int i = m->levels - 2; i >= 0; i--) {
         txs_fill_parent(&m->level[i + 1], &source[i + 1].canvas, &m->level[i], &source[i].canvas,
                         m->bands);
-        if (!txs_cut_labels(&m->level[i], &source[i], m->bands, arena))
+        if (!txs_cut_labels(&m->level[i], &source[i], txs_is_alpha(m, 0) ? NULL : source[i].weight,
+                            m->bands, arena))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         txs_fill_labels(&m->level[i], &source[i].canvas, m->bands);
     }
@@ -3647,6 +3887,24 @@ static void txs_paint(void *context, int share) {
     }
 }
 
+/* All of the picture; out is untouched after an error. */
+static txm_status txs_paint_picture(const texsyn_job *job, txm_env *env, const txm_image *out) {
+    const int can_hide = job->desc.model->channels == TXS_MAX_BANDS;
+    const int wrap = job->desc.tileable ? TXM_WRAP_X | TXM_WRAP_Y : 0;
+    txm_arena arena;
+    txm_image to;
+    txm_arena_init(&arena, env);
+    txm_status status = txs_easel(out, can_hide, &arena, env, &to);
+    if (status == TXM_OK) {
+        txs_painter painter = {job, &to, job->level < 0 ? 0 : job->level};
+        txm_parallel_for(env, (to.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS, txs_paint,
+                         &painter);
+        status = txs_hang(&to, out, wrap, env);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
 /* Can the picture go there? */
 static txm_status txs_check_out(const texsyn_synth_desc *desc, const txm_image *out, txm_env *env) {
     const txm_status status = txm_image_check(out, "out", 0, env);
@@ -3664,10 +3922,7 @@ TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "draw: job is NULL");
     const txm_status status = txs_check_out(&job->desc, &out, env);
     if (status != TXM_OK) return status;
-    out = txm_image_resolve(out);
-    txs_painter painter = {job, &out, job->level < 0 ? 0 : job->level};
-    txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS, txs_paint, &painter);
-    return TXM_OK;
+    return txs_paint_picture(job, env, &out);
 }
 
 TEXSYN_API void texsyn_free(texsyn_job *job) {
@@ -3730,6 +3985,8 @@ typedef struct txs_ground { /* one level of a labelled picture */
     float *value;   /* planes of the bands, at least where pixels are not free; NULL if all are */
     uint8_t *label; /* 0.. or TXS_NO_LABEL */
     uint8_t *state; /* of enum txs_state   */
+    uint8_t *weight; /* of colours where they are known, see alpha.h; NULL = all are opaque */
+    int alpha[TXS_MAX_LABELS]; /* of each label: the band of alpha, or -1 */
 } txs_ground;
 
 /* Room for a ground; 0 if there is no memory. Labels and states are not set. */
@@ -3745,6 +4002,11 @@ static int txs_ground_make(txs_ground *g, txm_arena *arena, int width, int heigh
     g->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
     if (has_values)
         g->value = (float *)txm_arena_zero(arena, pixels, sizeof(float) * (size_t)bands);
+    if (has_values && bands == TXS_MAX_BANDS) { /* colours and alpha */
+        g->weight = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+        if (g->weight) memset(g->weight, TXS_OPAQUE, pixels);
+    }
+    for (int k = 0; k < TXS_MAX_LABELS; k++) g->alpha[k] = -1;
     return !arena->failed;
 }
 
@@ -3762,11 +4024,42 @@ static int txs_majority(const uint8_t *labels, int count) {
     return best;
 }
 
+/* The mean of the children with a label in a band of it: of colours as far as they are visible. */
+static float txs_mean_of_children(const txs_ground *g, const size_t *child, int children, int label,
+                                  int band) {
+    const float *plane = g->value + (size_t)band * (size_t)g->width * (size_t)g->height;
+    const uint8_t *weight = g->alpha[label] == band ? NULL : g->weight;
+    double sum = 0, plain = 0, shown = 0;
+    int count = 0;
+    for (int i = 0; i < children; i++) {
+        if (g->label[child[i]] != label) continue;
+        plain += (double)plane[child[i]];
+        count++;
+        if (!weight) continue;
+        sum += (double)weight[child[i]] * (double)plane[child[i]];
+        shown += weight[child[i]];
+    }
+    return txm_float(shown > 0 ? sum / shown : plain / count);
+}
+
+/* The weight of a coarser pixel: the mean, but not 0 where anything is visible. */
+static uint8_t txs_weight_of_children(const txs_ground *g, const size_t *child, int children,
+                                      int label) {
+    int sum = 0, count = 0;
+    for (int i = 0; i < children; i++) {
+        if (g->label[child[i]] != label) continue;
+        sum += g->weight[child[i]];
+        count++;
+    }
+    if (sum < count) return (uint8_t)(sum > 0);
+    return (uint8_t)(count ? sum / count : 0);
+}
+
 /* One pixel of the coarser level from the children of it that there are. */
 static void txs_halve_pixel(const txs_ground *fine, const size_t *child, int children,
                             txs_ground *coarse, size_t to) {
     uint8_t labels[4], least = TXS_SOURCE;
-    int label, count = 0, any_free = 0;
+    int label, any_free = 0;
     for (int i = 0; i < children; i++) labels[i] = fine->label[child[i]];
     label = txs_majority(labels, children);
     for (int i = 0; i < children; i++) {
@@ -3777,23 +4070,18 @@ static void txs_halve_pixel(const txs_ground *fine, const size_t *child, int chi
     coarse->label[to] = (uint8_t)label;
     coarse->state[to] = any_free ? (uint8_t)TXS_FREE : least;
     if (any_free || !coarse->value || label == TXS_NO_LABEL) return;
-    for (int b = 0; b < fine->bands; b++) {
-        const float *plane = fine->value + (size_t)b * (size_t)fine->width * (size_t)fine->height;
-        double sum = 0;
-        count = 0;
-        for (int i = 0; i < children; i++) {
-            if (labels[i] != label) continue;
-            sum += (double)plane[child[i]];
-            count++;
-        }
+    for (int b = 0; b < fine->bands; b++)
         coarse->value[(size_t)b * (size_t)coarse->width * (size_t)coarse->height + to] =
-            txm_float(sum / count);
-    }
+            txs_mean_of_children(fine, child, children, label, b);
+    if (coarse->weight)
+        coarse->weight[to] = txs_weight_of_children(fine, child, children, label);
 }
 
 /* The next coarser level, of half the size, rounded up. A pixel takes the label of most of its
    children and the mean of those; it is free if one of them is. */
 static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
+    memcpy(coarse->alpha, fine->alpha, sizeof coarse->alpha);
+    if (!fine->weight) coarse->weight = NULL;
     for (int y = 0; y < coarse->height; y++) {
         for (int x = 0; x < coarse->width; x++) {
             size_t child[4];
@@ -3810,25 +4098,33 @@ static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
 }
 
 /* The bands of a texture: principal components of its visible colours; alpha is a band if it varies.
-   mask: a byte for each pixel of the picture, not 0 where the texture is; of these, the fully
-   transparent ones are taken out, unless all are, when any colour will do. */
+   mask: a byte for each pixel of the picture, not 0 where the texture is; becomes the weights. If
+   nothing is visible there is one band, in which everything is 0. */
 static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t *mask) {
     const int pixels = im->width * im->height;
     txs_source s;
-    int visible = 0, hidden = 0;
+    int visible = 0, hidden = 0, partial = 0;
     for (int i = 0; i < pixels && m->channels == 4; i++) {
-        const int is_seen = txm_image_get(im, i % im->width, i / im->width, 3) > 0;
-        visible += mask[i] && is_seen;
-        hidden += mask[i] && !is_seen;
+        if (!mask[i]) continue;
+        mask[i] = txs_weight_of((double)txm_image_get(im, i % im->width, i / im->width, 3));
+        visible += mask[i] > 0;
+        hidden += mask[i] == 0;
+        partial += mask[i] > 0 && mask[i] < TXS_OPAQUE;
     }
-    for (int i = 0; i < pixels && visible; i++)
-        if (!(txm_image_get(im, i % im->width, i / im->width, 3) > 0)) mask[i] = 0;
+    if (hidden && !visible) {
+        m->bands = 1;
+        memset(m->mean, 0, sizeof m->mean);
+        memset(m->basis, 0, sizeof m->basis);
+        m->basis[0][0] = 1;
+        return;
+    }
     memset(&s, 0, sizeof s);
     s.width = im->width;
     s.height = im->height;
     s.mask = mask;
+    s.weight = partial ? mask : NULL;
     txs_find_bands(m, im, &s);
-    if (visible && hidden && m->basis[m->bands - 1][3] == 0) m->basis[m->bands++][3] = 1;
+    if (hidden && !txs_is_alpha(m, m->bands - 1)) m->basis[m->bands++][3] = 1;
 }
 
 /* Those of the source pixels of a label; im is as large as the ground. mask: scratch, as above. */
@@ -3840,14 +4136,15 @@ static void txs_ground_find_bands(const txs_ground *g, const txm_image *im, int 
     txs_find_visible_bands(m, im, mask);
 }
 
-/* Set a pixel's values to those of its samples in the bands of a model; a transparent one has no
-   colour, which is the mean one. */
+/* Set a pixel's values to those of its samples in the bands of a model, and its weight; a
+   transparent one has no colour, which is the mean one. */
 static void txs_ground_set(txs_ground *g, size_t at, const texsyn_model *m, const float sample[4]) {
     const size_t pixels = (size_t)g->width * (size_t)g->height;
     double c[4] = {0, 0, 0, 0};
     for (int k = 0; k < m->channels; k++)
         c[k] = 255.0 * (double)sample[k] - (double)m->mean[k];
     if (m->channels == 4 && !(sample[3] > 0)) c[0] = c[1] = c[2] = 0;
+    if (g->weight) g->weight[at] = txs_weight_of((double)sample[3]);
     for (int b = 0; b < m->bands; b++) {
         double v = 0;
         for (int k = 0; k < m->channels; k++) v += (double)m->basis[b][k] * c[k];
@@ -3867,6 +4164,44 @@ static void txs_ground_split(txs_ground *g, const txm_image *im, texsyn_model *c
             txs_ground_set(g, i, m, sample);
         }
     }
+}
+
+/* Hidden pixels of a label borrow the colours of visible ones, in the band of a colour. visible:
+   scratch, a number for each pixel; own: a byte. */
+static void txs_ground_borrow(txs_ground *g, int label, int band, uint32_t *visible, uint8_t *own) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    float *plane = g->value + (size_t)band * pixels;
+    uint32_t count = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        own[i] = g->label[i] == label && g->state[i] != TXS_FREE ? g->weight[i] : 0;
+        if (own[i]) visible[count++] = (uint32_t)i;
+    }
+    txs_lenders lenders = txs_lenders_of(own, g->width, g->height, visible, count);
+    for (size_t i = 0; i < pixels && count; i++)
+        if (g->label[i] == label && !g->weight[i])
+            plane[i] = plane[txs_lender(&lenders, i)];
+}
+
+/* After all pixels are set that are known: hidden ones borrow colours, for which see alpha.h.
+   Returns 0 if there is no memory. */
+static int txs_ground_show(txs_ground *g, texsyn_model *const *model, int labels,
+                           txm_arena *arena) {
+    const size_t pixels = (size_t)g->width * (size_t)g->height;
+    int is_opaque = 1;
+    for (size_t i = 0; i < pixels && g->weight && is_opaque; i++)
+        is_opaque = g->weight[i] == TXS_OPAQUE;
+    if (is_opaque) g->weight = NULL;
+    if (!g->weight) return 1;
+    uint32_t *visible = (uint32_t *)txm_arena_alloc(arena, pixels, sizeof *visible);
+    uint8_t *own = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
+    if (arena->failed) return 0;
+    for (int k = 0; k < labels; k++) {
+        for (int b = 0; b < model[k]->bands; b++) {
+            if (txs_is_alpha(model[k], b)) g->alpha[k] = b;
+            else txs_ground_borrow(g, k, b, visible, own);
+        }
+    }
+    return 1;
 }
 
 /* How the bands of a label are quantised: from its source pixels. Returns how many these are; with
@@ -3892,7 +4227,7 @@ static size_t txs_ground_quantise(const txs_ground *g, int label, int bands, txs
     s.canvas.pixels = bytes;
     s.canvas.plane = (ptrdiff_t)count;
     for (int b = 0; b < bands; b++) {
-        const float fill = txs_quantise_band(level, b, &s);
+        const float fill = txs_quantise_band(level, b, &s, NULL);
         if (dither) dither[b] = fill;
     }
     return count;
@@ -3907,11 +4242,14 @@ static size_t txs_ground_quantise(const txs_ground *g, int label, int bands, txs
 
      label   of all pixels
      sample  of source pixels, TXS_NO_LABEL elsewhere: where target statistics are taken
-     parent  of pixels that have a parent of their own label, TXS_NO_LABEL elsewhere        */
+     parent  of pixels that have a parent of their own label, TXS_NO_LABEL elsewhere
+
+   Where not all colours are visible a last plane has their weights (alpha.h).              */
 typedef struct txs_mosaic {
     txs_canvas canvas;
     int labels, bands;
     ptrdiff_t label, sample, parent; /* from plane 0 to these planes; parent 0 = no parents */
+    ptrdiff_t weight;                /* the same; 0 = all is visible                        */
     const uint8_t *state;            /* of the ground */
 } txs_mosaic;
 
@@ -3938,15 +4276,17 @@ static int txs_is_free(const txs_mosaic *m, int x, int y) {
    Returns 0 if there is no memory; release it with txs_mosaic_free. */
 static int txs_mosaic_make(txs_mosaic *m, const txm_env *env, const txs_ground *g, int labels,
                            int margin, int has_parents) {
-    const int planes = g->bands * (has_parents ? 2 : 1);
+    const int planes = g->bands * (has_parents ? 2 : 1), has_weights = g->weight != NULL;
     memset(m, 0, sizeof *m);
-    if (!txs_canvas_make(&m->canvas, env, g->width, g->height, margin, planes + 2 + has_parents))
+    if (!txs_canvas_make(&m->canvas, env, g->width, g->height, margin,
+                         planes + 2 + has_parents + has_weights))
         return 0;
     m->labels = labels;
     m->bands = g->bands;
     m->label = planes * m->canvas.plane;
     m->sample = m->label + m->canvas.plane;
     m->parent = has_parents ? m->sample + m->canvas.plane : 0;
+    m->weight = has_weights ? m->sample + (1 + has_parents) * m->canvas.plane : 0;
     m->state = g->state;
     memset(m->canvas.pixels + m->label, TXS_NO_LABEL,
            (size_t)m->canvas.plane * (size_t)(2 + has_parents));
@@ -3956,6 +4296,7 @@ static int txs_mosaic_make(txs_mosaic *m, const txm_env *env, const txs_ground *
             uint8_t *p = txs_pixel(m, x, y);
             p[m->label] = g->label[i];
             if (g->state[i] == TXS_SOURCE) p[m->sample] = g->label[i];
+            if (has_weights) p[m->weight] = g->weight[i];
         }
     }
     return 1;
@@ -4786,6 +5127,37 @@ static int txs_is_tail_at(const txs_mosaic *m, const txs_type *t, int32_t at) {
     return txs_is_tail(t, x & 1, y & 1);
 }
 
+/* Does the type say something of colours only, and are some of them hidden in this mosaic? */
+static int txs_is_weighed(const txs_mosaic *m, const texsyn_model *model, const txs_type *t) {
+    return m->weight && !txs_is_alpha(model, t->band) && !txs_is_alpha(model, t->other);
+}
+
+/* Histogram of a clique type of colours over source pixels: a clique counts with the least weight of
+   its members. Returns the number of cliques. */
+static int64_t txs_study_weigh(const txs_mosaic *m, const txs_pixels *tails, int label,
+                               const txs_level *level, const txs_type *t, int32_t share[TXS_BINS]) {
+    const txs_tally y = txs_tally_make(t, level, &m->canvas, m->bands);
+    const txs_guard guard = txs_guard_make(m, t, label, 0, m->sample);
+    int at[4][2], drawn = txs_members(t, at);
+    uint32_t h[TXS_BINS];
+    int64_t total = 0;
+    if (t->kind == TEXSYN_SCALE) drawn = 2; /* the others are of the coarser level */
+    memset(h, 0, sizeof h);
+    for (int i = 0; i < tails->count; i++) {
+        const uint8_t *p = m->canvas.pixels + tails->at[i];
+        if (!txs_holds(&guard, p) || (t->phase && !txs_is_tail_at(m, t, tails->at[i]))) continue;
+        uint32_t least = TXS_OPAQUE;
+        for (int k = 0; k < drawn; k++) {
+            const uint32_t weight = p[m->weight + at[k][1] * m->canvas.stride + at[k][0]];
+            least = weight < least ? weight : least;
+        }
+        h[txs_bin(&y, p)] += least;
+        total += least;
+    }
+    txs_normalise(h, total, share);
+    return (total + TXS_OPAQUE - 1) / TXS_OPAQUE;
+}
+
 /* Histogram of a clique type over its tails, whose label is asked of the plane `labels`. Returns the
    number of cliques. */
 static int64_t txs_study_measure(const txs_mosaic *m, ptrdiff_t labels, const txs_pixels *tails,
@@ -4819,7 +5191,20 @@ static int64_t txs_study_measure(const txs_mosaic *m, ptrdiff_t labels, const tx
     return total;
 }
 
-/* The same of a crossing type. */
+/* The same of source pixels, and of colours that are visible. */
+static int64_t txs_study_target(const txs_study *s, int label, const txs_type *t,
+                                int32_t share[TXS_BINS]) {
+    const txs_level *level = &s->model[label]->level[s->index];
+    const txs_pixels *tails = &s->tails[label];
+    if (txs_is_weighed(s->source, s->model[label], t)) {
+        const int64_t n = txs_study_weigh(s->source, tails, label, level, t, share);
+        if (n || t->kind != TEXSYN_SINGLE) return n;
+        /* no tail is visible; what they have borrowed will do, since there must be a histogram */
+    }
+    return txs_study_measure(s->source, s->source->sample, tails, label, level, t, share);
+}
+
+/* The same of a crossing type. Colours are counted where they are visible. */
 static int64_t txs_study_measure_crossing(const txs_study *s, const txs_mosaic *m, ptrdiff_t labels,
                                           const txs_pixels *tails, const txs_crossing *c,
                                           int32_t share[TXS_BINS]) {
@@ -4827,12 +5212,17 @@ static int64_t txs_study_measure_crossing(const txs_study *s, const txs_mosaic *
     const ptrdiff_t d = t->dy * m->canvas.stride + t->dx, plane = m->canvas.plane;
     const uint8_t *tail = s->texture[c->tail].level->classes[t->band];
     const uint8_t *head = s->texture[c->head].level->classes[t->other];
+    const int is_weighed = m->weight && labels == m->sample;
+    const int tail_is_colour = is_weighed && !txs_is_alpha(s->model[c->tail], t->band);
+    const int head_is_colour = is_weighed && !txs_is_alpha(s->model[c->head], t->other);
     uint32_t h[TXS_BINS];
     int64_t total = 0;
     memset(h, 0, sizeof h);
     for (int i = tails->pure; i < tails->count; i++) {
         const uint8_t *p = m->canvas.pixels + tails->at[i], *q = p + d;
-        if (q[labels] != c->head) continue;
+        if (q[labels] != c->head || (tail_is_colour && !p[m->weight]) ||
+            (head_is_colour && !q[m->weight]))
+            continue;
         h[tail[p[t->band * plane]] * TXS_CLASSES + head[q[t->other * plane]]]++;
         total++;
     }
@@ -4905,8 +5295,7 @@ static void txs_study_preselect(txs_study *s, int label) {
     level->type_count = 0;
     for (int b = 0; b < bands; b++) {
         txs_type *t = txs_add_type(level, TEXSYN_SINGLE, b, b, 0, 0);
-        txs_study_measure(s->source, s->source->sample, &s->tails[label], label, level, t,
-                          t->share);
+        txs_study_target(s, label, t, t->share);
         txs_make_classes(level, b);
     }
     for (int b = 0; b < bands; b++) {
@@ -4919,9 +5308,7 @@ static void txs_study_preselect(txs_study *s, int label) {
     }
     for (int k = bands; k < level->type_count; k++) {
         txs_type t = level->types[k];
-        if (txs_study_measure(s->source, s->source->sample, &s->tails[label], label, level, &t,
-                              t.share) > 0)
-            level->types[kept++] = t;
+        if (txs_study_target(s, label, &t, t.share) > 0) level->types[kept++] = t;
     }
     level->type_count = kept;
     TEXSYN_ASSERT(kept <= TXS_PRESELECTED);
@@ -4959,8 +5346,7 @@ static void txs_study_source(void *context, int i) {
     txs_study *s = (txs_study *)context;
     txs_learner *a = &s->learner[s->now];
     txs_candidate *c = &a->candidates[i];
-    const int64_t n = txs_study_measure(s->source, s->source->sample, &s->tails[s->now], s->now,
-                                        a->level, &c->type, c->type.share);
+    const int64_t n = txs_study_target(s, s->now, &c->type, c->type.share);
     const int64_t m = s->free_tails[s->now].count + 1;
     c->noise = n ? txm_float(sqrt(1.0 / (double)n + 1.0 / (double)m)) : 0;
     if (!n) c->weight = 0;
@@ -5345,20 +5731,25 @@ static double txs_tone_value(const txs_tone *t, int x, int y, double mix) {
     return q + mix * ((double)t->at[i] - q) + (1 - mix) * (double)t->grain[i];
 }
 
+/* Does the pixel have the state, and is it not a hidden colour? */
+static int txs_tone_counts(const txs_tone *t, int x, int y, int state) {
+    const txs_ground *g = t->ground;
+    const size_t i = txs_tone_index(t, x, y);
+    if (g->state[i] != state) return 0;
+    return state == TXS_FREE || !g->weight || g->alpha[t->label] == t->band || g->weight[i];
+}
+
 /* Mean difference of neighbours that both have a state; negative if there are none. */
 static double txs_tone_roughness(const txs_tone *t, int state, double mix) {
     double sum = 0;
     int64_t count = 0;
     for (int y = 0; y < t->ground->height; y++) {
         for (int x = 0; x < t->ground->width; x++) {
-            if (!txs_tone_has(t, x, y) || t->ground->state[txs_tone_index(t, x, y)] != state)
-                continue;
+            if (!txs_tone_has(t, x, y) || !txs_tone_counts(t, x, y, state)) continue;
             const double value = txs_tone_value(t, x, y, mix);
             for (int k = 0; k < 2; k++) {
                 const int nx = x + !k, ny = y + k;
-                if (!txs_tone_has(t, nx, ny) ||
-                    t->ground->state[txs_tone_index(t, nx, ny)] != state)
-                    continue;
+                if (!txs_tone_has(t, nx, ny) || !txs_tone_counts(t, nx, ny, state)) continue;
                 sum += fabs(txs_tone_value(t, nx, ny, mix) - value);
                 count++;
             }
@@ -5506,14 +5897,6 @@ static int txs_fill_is_sound(const txm_image *im, int x, int y) {
         if (!txm_is_finite((double)v) || !(fabsf(v) <= 1e6f)) return 0;
     }
     return 1;
-}
-
-/* Copy rows from one picture to another of the same form. */
-static void txs_copy_picture(const txm_image *from, const txm_image *to) {
-    const txm_image a = txm_image_resolve(*from), b = txm_image_resolve(*to);
-    const size_t row = (size_t)a.width * (size_t)a.channels * txm_sample_bytes(a.sample);
-    for (int y = 0; y < a.height; y++)
-        memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
 }
 
 /* The copy of the picture and what is known of it. */
@@ -5820,27 +6203,29 @@ static double txs_band_deviation(const txs_level *l, int band) {
    texture from another photograph then has the light of this one. Alpha stays as it is. */
 static void txs_fill_relight(const txs_filler *f, texsyn_model *m) {
     const int colours = m->channels < 3 ? 1 : 3;
+    const int first = txs_is_alpha(m, 0) && m->bands > 1; /* the first band of colours */
     const txm_image *im = &f->image;
     double mean[3] = {0, 0, 0}, square = 0, along = 0, count = 0;
     for (int y = 0; y < im->height; y++) {
         for (int x = 0; x < im->width; x++) {
-            double band = 0;
+            double band = 0, weight = 1;
             if (f->state[(size_t)y * (size_t)im->width + (size_t)x] != TXS_SOURCE ||
                 (m->channels == 4 && !(txm_image_get(im, x, y, 3) > 0)))
                 continue;
+            if (m->channels == 4) weight = (double)txm_clampf(txm_image_get(im, x, y, 3), 0, 1);
             for (int c = 0; c < colours; c++) {
                 const double v = 255.0 * (double)txm_image_get(im, x, y, c);
-                mean[c] += v;
-                band += (double)m->basis[0][c] * (v - (double)m->mean[c]);
+                mean[c] += weight * v;
+                band += (double)m->basis[first][c] * (v - (double)m->mean[c]);
             }
-            along += band;
-            square += band * band;
-            count++;
+            along += weight * band;
+            square += weight * (band * band);
+            count += weight;
         }
     }
     if (!(count >= (double)TXS_FILL_FEW)) return;
     const double variance = square / count - along / count * (along / count);
-    const double now = txs_band_deviation(&m->level[0], 0);
+    const double now = txs_band_deviation(&m->level[0], first);
     double gain = variance > 0 && now > 0 ? sqrt(variance) / now : 1;
     gain = gain < TXS_FILL_DIMMEST ? TXS_FILL_DIMMEST : gain;
     gain = gain > TXS_FILL_BRIGHTEST ? TXS_FILL_BRIGHTEST : gain;
@@ -5895,6 +6280,8 @@ static txm_status txs_pane_prepare(const txs_filler *f, txs_pane *p, const texsy
     if (known && levels > known->levels) levels = known->levels;
     if (!known) txs_ground_find_bands(&g[0], &p->view, 0, p->model, p->reached);
     txs_ground_split(&g[0], &p->view, &p->model);
+    if (!txs_ground_show(&g[0], &p->model, 1, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     for (p->levels = 1; p->levels < levels; p->levels++) {
         const txs_ground *fine = &g[p->levels - 1];
         txs_ground *coarse = &g[p->levels];
@@ -6123,6 +6510,7 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
         if (filler.given && desc->relight) txs_fill_relight(&filler, filler.given);
         status = txs_fill_windows(&filler, &arena, env);
     }
+    if (status == TXM_OK) status = txm_image_bleed(&filler.image, 0, env);
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
     return status;
@@ -6519,14 +6907,17 @@ typedef struct txs_seam {
     uint8_t *mismatch; /* of each node; those outside the picture have 0 */
 } txs_seam;
 
-/* By how much the pictures differ at a pixel, 0..255; what is transparent in both does not. */
+/* By how much the pictures differ at a pixel, 0..255; colours as far as they are visible. */
 static uint8_t txs_mismatch(const txs_pair_of_pictures *p, int x, int y) {
     const int channels = p->picture[0].channels;
-    double sum = 0;
-    if (channels == 4 && !(txs_pair_get(p, 0, x, y, 3) > 0) && !(txs_pair_get(p, 1, x, y, 3) > 0))
-        return 0;
-    for (int c = 0; c < channels; c++)
-        sum += fabs((double)txs_pair_get(p, 0, x, y, c) - (double)txs_pair_get(p, 1, x, y, c));
+    double sum = 0, shown[2] = {1, 1};
+    for (int k = 0; k < 2 && channels == 4; k++)
+        shown[k] = (double)txm_clampf(txs_pair_get(p, k, x, y, 3), 0, 1);
+    for (int c = 0; c < channels; c++) {
+        const double a = (double)txs_pair_get(p, 0, x, y, c);
+        const double b = (double)txs_pair_get(p, 1, x, y, c);
+        sum += c < 3 ? fabs(shown[0] * a - shown[1] * b) : fabs(a - b);
+    }
     const double share = sum / channels;
     return (uint8_t)(share < 1 ? (int)floor(share * 255) : (int)TXS_SEAM_ROUGHEST);
 }
@@ -6722,12 +7113,15 @@ static txm_status txs_knit_open(txs_knitter *k, txm_arena *arena, txm_env *env) 
     const texsyn_knit_desc *d = k->desc;
     const size_t entries = (size_t)TXS_NOISE + TXS_VALUES;
     const size_t pixels = txs_pixels_of(d->a.width, d->a.height);
-    k->pair.picture[0] = txm_image_resolve(d->a);
-    k->pair.picture[1] = txm_image_resolve(d->b);
+    txm_status status = txm_image_bled(&d->a, 0, arena, env, &k->pair.picture[0]);
+    if (status == TXM_OK) status = txm_image_bled(&d->b, 0, arena, env, &k->pair.picture[1]);
+    if (status == TXM_OK && d->border.pixels)
+        status = txm_image_bled(&d->border, 0, arena, env, &k->border.picture[0]);
+    if (status != TXM_OK) return status;
     k->pair.width = d->a.width;
     k->pair.height = d->a.height;
     if (d->border.pixels) {
-        k->border.picture[0] = k->border.picture[1] = txm_image_resolve(d->border);
+        k->border.picture[1] = k->border.picture[0];
         k->border.width = d->border.width;
         k->border.height = d->border.height;
     }
@@ -6950,9 +7344,12 @@ static txm_status txs_loom_source(txs_loom *w, txm_arena *arena, txm_env *env) {
                            (size_t)y * (size_t)width +
                                (size_t)(x + label * (h->width + TXS_KNIT_GAP)));
         }
+    }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
+    for (int label = 0; label < TXS_KNIT_TWO; label++)
         txs_ground_quantise(g, label, w->model[label]->bands, w->texture[label].level, values,
                             bytes, w->spread[label]);
-    }
     return TXM_OK;
 }
 
@@ -6976,6 +7373,8 @@ static txm_status txs_loom_canvas(txs_loom *w, txm_arena *arena, txm_env *env) {
         g->label[i] = is_later ? (uint8_t)TXS_NO_LABEL : k->label[in];
         txs_loom_split(w, &done, k->label[in], x, y, g, (size_t)i);
     }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     return TXM_OK;
 }
 
@@ -6995,6 +7394,8 @@ static txm_status txs_loom_example(txs_loom *w, txm_arena *arena, txm_env *env) 
             txs_loom_split(w, &k->border, g->label[at], x, y, g, at);
         }
     }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example of a border");
     return TXM_OK;
 }
 
@@ -7023,6 +7424,8 @@ static txm_status txs_loom_invent(txs_loom *w, txm_arena *arena, txm_env *env) {
         g->label[i] = (uint8_t)(mismatch[i] <= most ? label : (int)TXS_NO_LABEL);
         txs_loom_split(w, &k->pair, label, h->left + x, h->top + y, g, (size_t)i);
     }
+    if (!txs_ground_show(g, w->model, TXS_KNIT_TWO, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a window");
     return TXM_OK;
 }
 
@@ -7228,6 +7631,7 @@ TEXSYN_API txm_status texsyn_knit(const texsyn_knit_desc *desc, txm_env *env, tx
         if (is_alike) status = txs_knit_alike(&k, material, env, out);
         else {
             status = txs_knit_different(&k, material, env);
+            if (status == TXM_OK) status = txm_image_bleed(&k.image, 0, env);
             if (status == TXM_OK) txs_copy_picture(&k.image, &out);
         }
     }
@@ -7342,25 +7746,29 @@ static int txs_takes_part(const txm_image *im, const txm_image *mask, int x, int
     return gray >= TXS_CODES / 2;
 }
 
-/* One pixel of the scene: the mean of those of its square that take part. */
+/* One pixel of the scene: the mean of those of its square that take part, weighted by alpha. */
 static void txs_reduce(txs_scene *s, const txm_image *im, const txm_image *mask,
                        const txs_colours *tables, int x, int y) {
     const int f = s->factor, colours = im->channels < 3 ? 1 : 3;
     const int right = txm_clampi((x + 1) * f, 0, im->width);
     const int bottom = txm_clampi((y + 1) * f, 0, im->height);
     const size_t at = (size_t)y * (size_t)s->width + (size_t)x;
-    int64_t sum[3] = {0, 0, 0}, parts = 0, all = 0;
+    const int alpha = txm_image_has_alpha(im);
+    int64_t sum[3] = {0, 0, 0}, weights = 0, parts = 0, all = 0;
     for (int v = y * f; v < bottom; v++) {
         for (int u = x * f; u < right; u++, all++) {
             if (!txs_takes_part(im, mask, u, v)) continue;
-            for (int c = 0; c < colours; c++) sum[c] += txs_sample_code(im, u, v, c);
+            const int weight = alpha ? txs_sample_code(im, u, v, im->channels - 1) : 1;
+            for (int c = 0; c < colours; c++)
+                sum[c] += (int64_t)weight * txs_sample_code(im, u, v, c);
+            weights += weight;
             parts++;
         }
     }
     s->counted[at] = (uint8_t)(parts > 0 && 2 * parts >= all);
-    if (!parts) parts = 1;
+    if (!weights) weights = 1;
     int code[3], lab[3];
-    for (int c = 0; c < 3; c++) code[c] = (int)(sum[colours == 1 ? 0 : c] / parts);
+    for (int c = 0; c < 3; c++) code[c] = (int)(sum[colours == 1 ? 0 : c] / weights);
     txs_code_to_lab(tables, code, lab);
     for (int c = 0; c < 3; c++) s->lab[c][at] = (int16_t)lab[c];
 }
@@ -9859,6 +10267,8 @@ static txm_status txs_composite_prepare(txs_composer *w, txm_arena *arena, txm_e
     for (int k = 0; k < c->labels; k++)
         txs_ground_find_bands(&g[0], &w->example, k, c->model[k], bytes);
     txs_ground_split(&g[0], &w->example, c->model);
+    if (!txs_ground_show(&g[0], c->model, c->labels, arena))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
     c->levels = 1;
     while (c->levels < TXS_MAX_LEVELS && side >> c->levels >= TXS_COMPOSITE_TOP) {
         const txs_ground *fine = &g[c->levels - 1];
@@ -10342,9 +10752,14 @@ TEXSYN_API txm_status texsyn_composite_synthesize(const texsyn_composite_desc *d
     txs_lay_plane_free(&map, env);
     if (status == TXM_OK) status = txs_composite_sweep(desc, ground, &m, noise, cool, maps, env);
     if (status == TXM_OK) {
-        txs_composite_painter painter = {desc, &m, &out};
-        txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS,
-                         txs_composite_paint, &painter);
+        txm_image to;
+        status = txs_easel(&out, c->channels == TXS_MAX_BANDS, &arena, env, &to);
+        if (status == TXM_OK) {
+            txs_composite_painter painter = {desc, &m, &to};
+            txm_parallel_for(env, (to.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS,
+                             txs_composite_paint, &painter);
+            status = txs_hang(&to, &out, 0, env);
+        }
     }
     txs_mosaic_free(&m, env);
     txm_arena_free(&arena);
@@ -11241,15 +11656,18 @@ TEXSYN_API txm_status texsyn_light_apply(const texsyn_light *light, float streng
         return txm_fail(env, TXM_BAD_ARGUMENT, "light was not made by texsyn_light_learn");
     if (!(strength >= 0 && strength <= 1))
         return txm_fail(env, TXM_BAD_ARGUMENT, "strength must be 0 to 1");
-    const txm_status status = txs_check_lit(image, &out, env);
+    txm_status status = txs_check_lit(image, &out, env);
     if (status != TXM_OK) return status;
     txs_lit w;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    status = txm_image_bled(image, 0, &arena, env, &w.from);
     w.light = light;
-    w.from = txm_image_resolve(*image);
     w.to = txm_image_resolve(out);
     w.strength = (double)strength;
-    txm_parallel_for(env, TXS_LIT_SHARES, txs_light_share, &w);
-    return TXM_OK;
+    if (status == TXM_OK) txm_parallel_for(env, TXS_LIT_SHARES, txs_light_share, &w);
+    txm_arena_free(&arena);
+    return status;
 }
 
 TEXSYN_API txm_status texsyn_relight(const texsyn_relight_desc *desc, txm_env *env, txm_image out) {
@@ -12324,7 +12742,8 @@ TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float l
     if (status == TXM_OK) status = txm_image_check(picture, "picture", TEXSYN_MAX_PIXELS, env);
     if (status == TXM_OK) status = txm_image_check(&out, "out", TEXSYN_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
-    const txm_image from = txm_image_resolve(*picture), to = txm_image_resolve(out);
+    txm_image from = txm_image_resolve(*picture);
+    const txm_image to = txm_image_resolve(out);
     if (from.width != erosion->width || from.height != erosion->height)
         return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, "picture", "must be # x # like the erosion",
                                    (uint64_t)erosion->width, (uint64_t)erosion->height);
@@ -12336,10 +12755,13 @@ TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float l
 
     /* three rows of the mask, those above and below the one that is drawn */
     const size_t width = (size_t)from.width;
-    uint8_t *mask = (uint8_t *)txm_alloc(env, 3 * width);
-    if (!mask) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for three rows");
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint8_t *mask = (uint8_t *)txm_arena_alloc(&arena, 3, width);
+    status = mask ? txm_image_bled(picture, 0, &arena, env, &from)
+                  : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for three rows");
     const txs_level_of l = txs_level_make(erosion, level, levels);
-    for (int y = 0; y <= from.height; y++) {
+    for (int y = 0; y <= from.height && status == TXM_OK; y++) {
         uint8_t *next = mask + width * (size_t)(y % 3);
         for (int x = 0; x < from.width && y < from.height; x++)
             next[x] = (uint8_t)txs_is_eroded(&l, x, y);
@@ -12350,8 +12772,8 @@ TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float l
         for (int x = 0; x < from.width; x++)
             txs_erode_pixel(erosion, &from, &to, x, y - 1, txs_cover(rows, x, from.width));
     }
-    txm_free(env, mask);
-    return TXM_OK;
+    txm_arena_free(&arena);
+    return status;
 }
 
 /* ---- the intact stone ------------------------------------------------------------------- */

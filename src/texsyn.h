@@ -68,6 +68,8 @@
      (corners, parallel differences, differences together with those of the coarser level), for what
      pairs cannot express; and for contours there are filters of 12 to 18 pixels and differences
      beside a label of the coarser level, which says how that changes and curves.
+     The colour of transparent pixels is never looked at: statistics of colours count what is
+     visible, weighted by alpha, and hidden colour of results continues the visible one.
      texsyn_fill does the same in a hole, with the surroundings fixed: it learns from the known pixels
      near the hole on the canvas of the hole itself.
 
@@ -289,8 +291,8 @@ typedef struct texsyn_fill_desc {
    removal). Holes are filled in windows of at most 256 x 256 pixels of hole.
 
    env    NULL, or how to allocate, report and spread the work
-   out    form of the image, may be the image itself: known pixels are copied, with the same bytes.
-          Untouched after an error
+   out    form of the image, may be the image itself: known pixels are copied, with the same bytes,
+          but for hidden colour. Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a mask
           that is empty or covers all, known samples that are not finite or beyond a million;
           TXM_TOO_SMALL if fewer than 256 pixels can be learned from; TXM_TOO_LARGE above
@@ -337,7 +339,7 @@ typedef struct texsyn_knit_desc {
 
    env    NULL, or how to allocate, report and spread the work
    out    form of a, may be a or b itself: outside the zone of the (displaced) border it has the bytes
-          of a or b. Untouched after an error
+          of a or b, but for hidden colour. Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a layout
           that is all black or all white, samples that are not finite or beyond a million;
           TXM_TOO_SMALL for pictures under 16 x 16, fewer than 256 pixels outside the zone, or an
@@ -555,7 +557,8 @@ TEXSYN_API float texsyn_erosion_share(const texsyn_erosion *erosion);
    picture  of the erosion's size, 1 to 4 channels; alpha is kept
    out      the caller's, of the same size and channels, also the picture itself; untouched after an
             error
-   return   TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY (for three rows)          */
+   return   TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_LARGE; TXM_OUT_OF_MEMORY (for three rows, and for a
+            copy of the picture if colour is hidden in it)                                     */
 TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float level,
                                           const txm_image *levels, const txm_image *picture,
                                           txm_env *env, txm_image out);

@@ -39,6 +39,30 @@ static int txs_weigh(const txm_image *im, const uint8_t *mask, uint8_t *weight) 
     return differ;
 }
 
+/* ---- hidden colour of results ------------------------------------------------------------ */
+
+/* Where a picture is to be painted: out itself, or a picture of that form in the arena if alpha can
+   hide colours, which then are bled; *to receives it. */
+static txm_status txs_easel(const txm_image *out, int can_hide, txm_arena *arena, txm_env *env,
+                            txm_image *to) {
+    *to = txm_image_resolve(*out);
+    if (!can_hide) return TXM_OK;
+    to->stride = 0;
+    *to = txm_image_resolve(*to);
+    to->pixels = txm_arena_alloc(arena, (size_t)to->height, (size_t)to->stride);
+    return to->pixels ? TXM_OK : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a picture");
+}
+
+/* What was painted becomes the result: hidden colours are bled. */
+static txm_status txs_hang(const txm_image *painted, const txm_image *out, int wrap, txm_env *env) {
+    if (painted->pixels == out->pixels) return TXM_OK;
+    const txm_status status = txm_image_bleed(painted, wrap, env);
+    if (status == TXM_OK) txs_copy_picture(painted, out);
+    return status;
+}
+
+/* ---- borrowed colours -------------------------------------------------------------------- */
+
 /* Who lends colours: visible pixels, and some places that are the same for all that borrow. */
 typedef struct txs_lenders {
     const uint8_t *weight; /* of each pixel, not 0 where it can lend */

@@ -583,10 +583,14 @@ TEXSYN_API txm_status texsyn_composite_synthesize(const texsyn_composite_desc *d
     txs_lay_plane_free(&map, env);
     if (status == TXM_OK) status = txs_composite_sweep(desc, ground, &m, noise, cool, maps, env);
     if (status == TXM_OK) {
-        txs_composite_painter painter = {desc, &m, &out};
-        txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS,
-                         txs_composite_paint, &painter);
-        if (c->channels == TXS_MAX_BANDS) status = txm_image_bleed(&out, 0, env);
+        txm_image to;
+        status = txs_easel(&out, c->channels == TXS_MAX_BANDS, &arena, env, &to);
+        if (status == TXM_OK) {
+            txs_composite_painter painter = {desc, &m, &to};
+            txm_parallel_for(env, (to.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS,
+                             txs_composite_paint, &painter);
+            status = txs_hang(&to, &out, 0, env);
+        }
     }
     txs_mosaic_free(&m, env);
     txm_arena_free(&arena);

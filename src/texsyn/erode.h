@@ -317,7 +317,8 @@ TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float l
     if (status == TXM_OK) status = txm_image_check(picture, "picture", TEXSYN_MAX_PIXELS, env);
     if (status == TXM_OK) status = txm_image_check(&out, "out", TEXSYN_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
-    const txm_image from = txm_image_resolve(*picture), to = txm_image_resolve(out);
+    txm_image from = txm_image_resolve(*picture);
+    const txm_image to = txm_image_resolve(out);
     if (from.width != erosion->width || from.height != erosion->height)
         return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, "picture", "must be # x # like the erosion",
                                    (uint64_t)erosion->width, (uint64_t)erosion->height);
@@ -329,10 +330,13 @@ TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float l
 
     /* three rows of the mask, those above and below the one that is drawn */
     const size_t width = (size_t)from.width;
-    uint8_t *mask = (uint8_t *)txm_alloc(env, 3 * width);
-    if (!mask) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for three rows");
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    uint8_t *mask = (uint8_t *)txm_arena_alloc(&arena, 3, width);
+    status = mask ? txm_image_bled(picture, 0, &arena, env, &from)
+                  : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for three rows");
     const txs_level_of l = txs_level_make(erosion, level, levels);
-    for (int y = 0; y <= from.height; y++) {
+    for (int y = 0; y <= from.height && status == TXM_OK; y++) {
         uint8_t *next = mask + width * (size_t)(y % 3);
         for (int x = 0; x < from.width && y < from.height; x++)
             next[x] = (uint8_t)txs_is_eroded(&l, x, y);
@@ -343,8 +347,8 @@ TEXSYN_API txm_status texsyn_erosion_draw(const texsyn_erosion *erosion, float l
         for (int x = 0; x < from.width; x++)
             txs_erode_pixel(erosion, &from, &to, x, y - 1, txs_cover(rows, x, from.width));
     }
-    txm_free(env, mask);
-    return TXM_OK;
+    txm_arena_free(&arena);
+    return status;
 }
 
 /* ---- the intact stone ------------------------------------------------------------------- */

@@ -110,14 +110,6 @@ static int txs_fill_is_sound(const txm_image *im, int x, int y) {
     return 1;
 }
 
-/* Copy rows from one picture to another of the same form. */
-static void txs_copy_picture(const txm_image *from, const txm_image *to) {
-    const txm_image a = txm_image_resolve(*from), b = txm_image_resolve(*to);
-    const size_t row = (size_t)a.width * (size_t)a.channels * txm_sample_bytes(a.sample);
-    for (int y = 0; y < a.height; y++)
-        memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
-}
-
 /* The copy of the picture and what is known of it. */
 static txm_status txs_fill_open(txs_filler *f, txm_arena *arena, txm_env *env) {
     const texsyn_fill_desc *d = f->desc;

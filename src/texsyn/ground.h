@@ -111,7 +111,8 @@ static uint8_t txs_weight_of_children(const txs_ground *g, const size_t *child, 
         sum += g->weight[child[i]];
         count++;
     }
-    return (uint8_t)(sum > 0 && sum < count ? 1 : sum / count);
+    if (sum < count) return (uint8_t)(sum > 0);
+    return (uint8_t)(count ? sum / count : 0);
 }
 
 /* One pixel of the coarser level from the children of it that there are. */

@@ -9,6 +9,14 @@ static size_t txs_pixels_of(int width, int height) {
     return (size_t)width * (size_t)height;
 }
 
+/* Copy rows from one picture to another of the same form. */
+static void txs_copy_picture(const txm_image *from, const txm_image *to) {
+    const txm_image a = txm_image_resolve(*from), b = txm_image_resolve(*to);
+    const size_t row = (size_t)a.width * (size_t)a.channels * txm_sample_bytes(a.sample);
+    for (int y = 0; y < a.height; y++)
+        memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
+}
+
 /* gray times alpha is at least half: the rule for masks */
 static int txs_is_white(const txm_image *mask, int x, int y) {
     const txm_image m = txm_image_resolve(*mask);

@@ -355,15 +355,18 @@ TEXSYN_API txm_status texsyn_light_apply(const texsyn_light *light, float streng
         return txm_fail(env, TXM_BAD_ARGUMENT, "light was not made by texsyn_light_learn");
     if (!(strength >= 0 && strength <= 1))
         return txm_fail(env, TXM_BAD_ARGUMENT, "strength must be 0 to 1");
-    const txm_status status = txs_check_lit(image, &out, env);
+    txm_status status = txs_check_lit(image, &out, env);
     if (status != TXM_OK) return status;
     txs_lit w;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    status = txm_image_bled(image, 0, &arena, env, &w.from);
     w.light = light;
-    w.from = txm_image_resolve(*image);
     w.to = txm_image_resolve(out);
     w.strength = (double)strength;
-    txm_parallel_for(env, TXS_LIT_SHARES, txs_light_share, &w);
-    return TXM_OK;
+    if (status == TXM_OK) txm_parallel_for(env, TXS_LIT_SHARES, txs_light_share, &w);
+    txm_arena_free(&arena);
+    return status;
 }
 
 TEXSYN_API txm_status texsyn_relight(const texsyn_relight_desc *desc, txm_env *env, txm_image out) {

@@ -193,6 +193,24 @@ static void txs_paint(void *context, int share) {
     }
 }
 
+/* All of the picture; out is untouched after an error. */
+static txm_status txs_paint_picture(const texsyn_job *job, txm_env *env, const txm_image *out) {
+    const int can_hide = job->desc.model->channels == TXS_MAX_BANDS;
+    const int wrap = job->desc.tileable ? TXM_WRAP_X | TXM_WRAP_Y : 0;
+    txm_arena arena;
+    txm_image to;
+    txm_arena_init(&arena, env);
+    txm_status status = txs_easel(out, can_hide, &arena, env, &to);
+    if (status == TXM_OK) {
+        txs_painter painter = {job, &to, job->level < 0 ? 0 : job->level};
+        txm_parallel_for(env, (to.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS, txs_paint,
+                         &painter);
+        status = txs_hang(&to, out, wrap, env);
+    }
+    txm_arena_free(&arena);
+    return status;
+}
+
 /* Can the picture go there? */
 static txm_status txs_check_out(const texsyn_synth_desc *desc, const txm_image *out, txm_env *env) {
     const txm_status status = txm_image_check(out, "out", 0, env);
@@ -210,11 +228,7 @@ TEXSYN_API txm_status texsyn_draw(const texsyn_job *job, txm_env *env, txm_image
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "draw: job is NULL");
     const txm_status status = txs_check_out(&job->desc, &out, env);
     if (status != TXM_OK) return status;
-    out = txm_image_resolve(out);
-    txs_painter painter = {job, &out, job->level < 0 ? 0 : job->level};
-    txm_parallel_for(env, (out.height + TXS_PAINT_ROWS - 1) / TXS_PAINT_ROWS, txs_paint, &painter);
-    if (job->desc.model->channels < TXS_MAX_BANDS) return TXM_OK;
-    return txm_image_bleed(&out, job->desc.tileable ? TXM_WRAP_X | TXM_WRAP_Y : 0, env);
+    return txs_paint_picture(job, env, &out);
 }
 
 TEXSYN_API void texsyn_free(texsyn_job *job) {

@@ -110,25 +110,29 @@ static int txs_takes_part(const txm_image *im, const txm_image *mask, int x, int
     return gray >= TXS_CODES / 2;
 }
 
-/* One pixel of the scene: the mean of those of its square that take part. */
+/* One pixel of the scene: the mean of those of its square that take part, weighted by alpha. */
 static void txs_reduce(txs_scene *s, const txm_image *im, const txm_image *mask,
                        const txs_colours *tables, int x, int y) {
     const int f = s->factor, colours = im->channels < 3 ? 1 : 3;
     const int right = txm_clampi((x + 1) * f, 0, im->width);
     const int bottom = txm_clampi((y + 1) * f, 0, im->height);
     const size_t at = (size_t)y * (size_t)s->width + (size_t)x;
-    int64_t sum[3] = {0, 0, 0}, parts = 0, all = 0;
+    const int alpha = txm_image_has_alpha(im);
+    int64_t sum[3] = {0, 0, 0}, weights = 0, parts = 0, all = 0;
     for (int v = y * f; v < bottom; v++) {
         for (int u = x * f; u < right; u++, all++) {
             if (!txs_takes_part(im, mask, u, v)) continue;
-            for (int c = 0; c < colours; c++) sum[c] += txs_sample_code(im, u, v, c);
+            const int weight = alpha ? txs_sample_code(im, u, v, im->channels - 1) : 1;
+            for (int c = 0; c < colours; c++)
+                sum[c] += (int64_t)weight * txs_sample_code(im, u, v, c);
+            weights += weight;
             parts++;
         }
     }
     s->counted[at] = (uint8_t)(parts > 0 && 2 * parts >= all);
-    if (!parts) parts = 1;
+    if (!weights) weights = 1;
     int code[3], lab[3];
-    for (int c = 0; c < 3; c++) code[c] = (int)(sum[colours == 1 ? 0 : c] / parts);
+    for (int c = 0; c < 3; c++) code[c] = (int)(sum[colours == 1 ? 0 : c] / weights);
     txs_code_to_lab(tables, code, lab);
     for (int c = 0; c < 3; c++) s->lab[c][at] = (int16_t)lab[c];
 }

@@ -65,6 +65,28 @@ static uint64_t rgba_deep(txm_env *env) {
     return both(&desc, 4, TXM_U16, 0, -2, env);
 }
 
+/* blobs with soft rims on nothing, which hides noise; learned, and a hole of it filled */
+static uint64_t cutout(txm_env *env) {
+    static uint8_t alpha[SIDE * SIDE], hole[SIDE * SIDE];
+    golden_noise(exemplar, SIDE, SIDE, 4);
+    golden_blobs(alpha, SIDE, SIDE, 1);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const int seen = (alpha[i] - 100) * 4;
+        exemplar[4 * i + 3] = (uint8_t)(seen < 0 ? 0 : seen > 255 ? 255 : seen);
+        hole[i] = i % SIDE > 20 && i % SIDE < 44 && i / SIDE > 30 && i / SIDE < 50 ? 255 : 0;
+    }
+    texsyn_learn_desc desc = learning(4);
+    desc.max_types = 8;
+    const uint64_t hash = both(&desc, 4, TXM_U8, 1, -1, env);
+    texsyn_fill_desc fill;
+    memset(&fill, 0, sizeof fill);
+    fill.image = desc.example;
+    fill.mask = golden_image(hole, SIDE, SIDE, 1, TXM_U8);
+    fill.quality = -1;
+    golden_need(texsyn_fill(&fill, env, golden_image(picture, SIDE, SIDE, 4, TXM_U8)), "fill", env);
+    return tk_hash(hash, picture, (size_t)SIDE * SIDE * 4);
+}
+
 static uint64_t blobs_fine(txm_env *env) {
     golden_blobs(exemplar, SIDE, SIDE, 1);
     texsyn_learn_desc desc = learning(1);
@@ -294,6 +316,7 @@ static uint64_t knitted(txm_env *env) {
 static const golden_case cases[] = {{"gray", gray},
                                     {"rgb-tileable", rgb_tileable},
                                     {"rgba-16-bits", rgba_deep},
+                                    {"cutout", cutout},
                                     {"blobs-fine-float", blobs_fine},
                                     {"masked", masked},
                                     {"file", file},
