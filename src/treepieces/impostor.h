@@ -109,7 +109,7 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
     }
     for (int i = 0; i < desc->card_count; i++)
         tpc_draw_card(desc, &desc->cards[i], &leaves, &c, &d);
-    return TXM_OK;
+    return txm_image_bleed(&c, 0, env);
 }
 
 #endif /* TREEPIECES_IMPOSTOR_H */

@@ -172,10 +172,8 @@ static void tpc_draw_row(void *context, int index) {
             for (int c = 0; c < 3; c++) sum[c] += color[c];
             covered++;
         }
-        /* transparent pixels have a color too, so that filtering shows no dark fringe */
         for (int c = 0; c < 3; c++)
-            txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered
-                                                    : 0.85f * s->species->leaf_color[c]);
+            txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered : 0);
         txm_image_set(&s->out, x, y, 3, (float)covered / (TPC_SAMPLES * TPC_SAMPLES));
     }
 }
@@ -421,7 +419,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
         else txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
     }
     txm_free(env, spray.marks);
-    return status;
+    return status == TXM_OK ? txm_image_bleed(&spray.out, 0, env) : status;
 }
 
 #endif /* TREEPIECES_SPRAY_H */

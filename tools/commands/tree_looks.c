@@ -67,14 +67,14 @@ static int list_tiles(const cJSON *json, const txm_image *atlas, tile_list *t, c
     return 1;
 }
 
-/* A square of the atlas, reduced by averaging. */
+/* A square of the atlas, reduced by averaging; colours count as much as they show. */
 static void reduce_tile(const txm_image *atlas, int x0, int y0, int size, const txm_image *out) {
-    const int channels = out->channels;
+    const int channels = out->channels, colors = txm_image_colours(out);
     const double step = (double)size / out->width;
     for (int y = 0; y < out->height; y++) {
         unsigned char *to = (unsigned char *)txm_image_row(out, y);
         for (int x = 0; x < out->width; x++) {
-            double sum[4] = {0, 0, 0, 0}, weights = 0;
+            double sum[4] = {0, 0, 0, 0}, weights = 0, shown = 0;
             const double left = x * step, right = left + step, top = y * step, bottom = top + step;
             for (int v = (int)top; v < size && v < bottom; v++) {
                 const double high = (v + 1 < bottom ? v + 1 : bottom) - (v > top ? v : top);
@@ -82,13 +82,16 @@ static void reduce_tile(const txm_image *atlas, int x0, int y0, int size, const 
                     (const unsigned char *)txm_image_row_const(atlas, y0 + v);
                 for (int u = (int)left; u < size && u < right; u++) {
                     const double wide = (u + 1 < right ? u + 1 : right) - (u > left ? u : left);
-                    for (int c = 0; c < channels; c++)
-                        sum[c] += high * wide * row[(x0 + u) * channels + c];
+                    const unsigned char *texel = row + (x0 + u) * channels;
+                    const double alpha = colors < channels ? texel[colors] / 255.0 : 1;
+                    for (int c = 0; c < colors; c++) sum[c] += alpha * (high * wide * texel[c]);
+                    shown += alpha * (high * wide);
                     weights += high * wide;
                 }
             }
-            for (int c = 0; c < channels; c++)
-                *to++ = (unsigned char)(sum[c] / weights + 0.5);
+            for (int c = 0; c < colors; c++)
+                *to++ = (unsigned char)(shown > 0 ? sum[c] / shown + 0.5 : 0);
+            if (colors < channels) *to++ = (unsigned char)(255 * shown / weights + 0.5);
         }
     }
 }
@@ -170,6 +173,9 @@ static int make_leaves(tree_job *j, int s) {
     if (j->species[s].leaf_count == 0) return CLI_DONE;
     if (j->leaf) {
         status = read_picture(&j->run, j->leaf, 4, TXM_U8, &image);
+        /* other programs' filters must not show what the picture hides */
+        if (!status)
+            status = check_result(&j->run, txm_image_bleed(&image, 0, &j->run.env), j->leaf);
     } else {
         status = new_picture(&j->run, DRAWN_LEAVES, DRAWN_LEAVES, 4, TXM_U8, &image);
         if (!status)
