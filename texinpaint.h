@@ -5,7 +5,8 @@
      Fills a hole in the texture of a mesh, across the seams of its atlas, or a hole in a plain
      picture: first the lines that end at the hole are continued through it, then the texture is
      completed along these lines, then everywhere else, from pieces of the surroundings [1]. Further
-     maps (normals, roughness, labels) are completed from the same pieces. No known texel changes.
+     maps (normals, roughness, labels) are completed from the same pieces. No known texel changes, but
+     for the colour of transparent ones, which is bled from the visible ones near by.
 
    QUICK START                                 (tests build and run this very block)
      // Remove a disc from a striped picture. cc -std=c99 quick.c -lm
@@ -2243,6 +2244,14 @@ static int txi_is_label(const txi_domain *d, int map) {
 static int txi_has_alpha(const txi_domain *d, int map) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     return !(kind && (kind->is_normal || kind->is_label)) && d->maps[map].channels % 2 == 0;
+}
+
+/* Continue the visible colours of all maps into what is transparent. */
+static txm_status txi_bleed(const txi_domain *d, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int map = 0; map < d->map_count && status == TXM_OK; map++)
+        if (txi_has_alpha(d, map)) status = txm_image_bleed(&d->maps[map], 0, env);
+    return status;
 }
 
 /* A channel of a texel; colours times their alpha, if has_alpha. */
@@ -5046,6 +5055,7 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
         }
         status = txi_gutter(&d, &arena, env, &filled);
     }
+    if (status == TXM_OK) status = txi_bleed(&d, env);
     if (status == TXM_OK) txi_deliver(&d, out);
     txm_arena_free(&arena);
     return status;
@@ -15284,6 +15294,7 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
         txi_choice_free(&job->choice);
         txm_arena_free(&job->of_window);
         status = txi_gutter(&job->domain, &job->of_window, &stage.env, &filled);
+        if (status == TXM_OK) status = txi_bleed(&job->domain, &stage.env);
         if (status != TXM_OK) break;
         txm_arena_free(&job->of_window);
         job->info.written += filled;

@@ -618,7 +618,9 @@ typedef struct treepieces_bark_desc {
 TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc);
 
 /* Draw the sheet. out is 8 tiles wide and 8 tiles per layer high, the layers one below the other,
-   with the channels and sample type of the tiles. */
+   with the channels and sample type of the tiles. The last of 2 or 4 channels is alpha: colours are
+   blended as far as they show, and hidden ones are bled from visible neighbours; after
+   TXM_OUT_OF_MEMORY only that is missing. */
 TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
                                           txm_image out);
 
@@ -648,7 +650,8 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
                                     treepieces_card *cards);
 
 /* Draw a spray of leaves procedurally, as the RGBA image of the cards. out: any size, 4 channels of
-   8 bits; partly drawn after TXM_CANCELLED. */
+   8 bits; where it is transparent it has the colour of the leaves near by, so that filters show no
+   fringe. Partly drawn after TXM_CANCELLED; without such colours after TXM_OUT_OF_MEMORY. */
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out);
 
@@ -658,7 +661,8 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
    leaves     their image, RGBA, 8 bits; texels with alpha below 1/2 are transparent
    right, up, forward  axes of the view: orthogonal unit vectors; forward points away from the eye
    color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255.
-              Covers -1..1 along right and up
+              Covers -1..1 along right and up. Where alpha is 0 the colour is that of cards near by
+              (but after TXM_OUT_OF_MEMORY), for filters
    depth      float, 1 channel, size of color: distance from the centre of the cloud towards the eye, in
               radii of the cloud; -2 where there is nothing                                      */
 typedef struct treepieces_impostor_desc {
@@ -3718,31 +3722,69 @@ static float tpc_fade(float x) {
     return t * t * (3 - 2 * t);
 }
 
-/* Texel (x, y) of a cell of the lowest row: its tile, blended towards the south side with what the
-   layer requires there. lower: four tiles, shown at half size, for HALVING. */
-static float tpc_blend_texel(const txm_image *tile, const txm_image *const lower[4], int layer,
-                             int x, int y, int c) {
+/* What is blended into a texel: one of the tile itself, or four of a tile that is shown at half
+   size. */
+typedef struct tpc_blend {
+    const txm_image *from;
+    int x, y, side; /* the first of side x side texels */
+    float weight;   /* of it; the rest is the texel's own */
+} tpc_blend;
+
+/* The blend of texel (x, y) of a cell of the lowest row: towards the south side what the layer
+   requires there. lower: four tiles, shown at half size, for HALVING. */
+static tpc_blend tpc_blend_at(const txm_image *tile, const txm_image *const lower[4], int layer,
+                              int x, int y) {
     const int last = tile->width - 1, size = tile->width;
-    const float plain = txm_image_get(tile, x, y, c);
     const float rise = (float)(last - y) / (float)size; /* from the south side, in tiles */
-    float other = plain, weight = 0;
+    tpc_blend b = {tile, x, y, 1, 0};
     if (layer == TREEPIECES_FOLD) { /* half of its mirror image: then it is symmetric */
-        weight = 0.5f * tpc_fade(4 * rise);
-        other = txm_image_get(tile, last - x, y, c);
+        b.weight = 0.5f * tpc_fade(4 * rise);
+        b.x = last - x;
     } else if (layer == TREEPIECES_TURN_LEFT) { /* its west side, turned to the south */
-        weight = tpc_fade(2 * rise);
-        other = txm_image_get(tile, last - y, x, c);
+        b.weight = tpc_fade(2 * rise);
+        b.x = last - y;
+        b.y = x;
     } else if (layer == TREEPIECES_TURN_RIGHT) { /* its east side */
-        weight = tpc_fade(2 * rise);
-        other = txm_image_get(tile, y, last - x, c);
+        b.weight = tpc_fade(2 * rise);
+        b.x = y;
+        b.y = last - x;
     } else if (layer == TREEPIECES_HALVING) {
-        const txm_image *half = lower[(2 * x >= size) + 2 * (2 * y >= size)];
-        const int u = 2 * x % size, v = 2 * y % size;
-        weight = tpc_fade(rise);
-        other = 0.25f * ((txm_image_get(half, u, v, c) + txm_image_get(half, u + 1, v, c)) +
-                         (txm_image_get(half, u, v + 1, c) + txm_image_get(half, u + 1, v + 1, c)));
+        b.weight = tpc_fade(rise);
+        b.from = lower[(2 * x >= size) + 2 * (2 * y >= size)];
+        b.x = 2 * x % size;
+        b.y = 2 * y % size;
+        b.side = 2;
     }
-    return txm_lerpf(plain, other, weight);
+    return b;
+}
+
+/* One channel of it, where all texels are opaque. */
+static float tpc_blend_channel(const txm_image *tile, const tpc_blend *b, int x, int y, int c) {
+    float other = txm_image_get(b->from, b->x, b->y, c);
+    if (b->side == 2)
+        other = 0.25f * ((other + txm_image_get(b->from, b->x + 1, b->y, c)) +
+                         (txm_image_get(b->from, b->x, b->y + 1, c) +
+                          txm_image_get(b->from, b->x + 1, b->y + 1, c)));
+    return txm_lerpf(txm_image_get(tile, x, y, c), other, b->weight);
+}
+
+/* All channels: colours count as much as they show. */
+static void tpc_blend_texel(const txm_image *tile, const tpc_blend *b, int x, int y, float *texel) {
+    const int count = b->side * b->side, channels = tile->channels;
+    txm_mean mean = txm_mean_of(channels);
+    float other[4][4];
+    txm_image_pixel(tile, x, y, texel);
+    int is_opaque = !txm_image_has_alpha(tile) || texel[channels - 1] >= 1;
+    for (int k = 0; k < count; k++) {
+        txm_image_pixel(b->from, b->x + k % 2, b->y + k / 2, other[k]);
+        is_opaque &= !txm_image_has_alpha(tile) || other[k][channels - 1] >= 1;
+    }
+    for (int c = 0; c < channels && is_opaque; c++)
+        texel[c] = tpc_blend_channel(tile, b, x, y, c);
+    if (is_opaque) return;
+    txm_mean_add(&mean, texel, 1 - (double)b->weight);
+    for (int k = 0; k < count; k++) txm_mean_add(&mean, other[k], (double)b->weight / count);
+    txm_mean_get(&mean, texel);
 }
 
 static void tpc_draw_cell(const txm_image *out, int column, int top, const txm_image *tile,
@@ -3754,10 +3796,13 @@ static void tpc_draw_cell(const txm_image *out, int column, int top, const txm_i
             memcpy(row, txm_image_row_const(tile, y), (size_t)tile->width * texel);
             continue;
         }
-        for (int x = 0; x < tile->width; x++)
+        for (int x = 0; x < tile->width; x++) {
+            const tpc_blend blend = tpc_blend_at(tile, lower, layer, x, y);
+            float color[4];
+            tpc_blend_texel(tile, &blend, x, y, color);
             for (int c = 0; c < tile->channels; c++)
-                txm_image_set(out, column * tile->width + x, top + y, c,
-                              tpc_blend_texel(tile, lower, layer, x, y, c));
+                txm_image_set(out, column * tile->width + x, top + y, c, color[c]);
+        }
     }
 }
 
@@ -3812,7 +3857,7 @@ TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_
     const txm_image o = txm_image_resolve(out);
     const int layers = treepieces_bark_layers(desc);
     for (int layer = 0; layer < layers; layer++) tpc_draw_layer(desc, &o, layer);
-    return TXM_OK;
+    return txm_image_bleed(&o, 0, env);
 }
 
 TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,
@@ -4242,10 +4287,8 @@ static void tpc_draw_row(void *context, int index) {
             for (int c = 0; c < 3; c++) sum[c] += color[c];
             covered++;
         }
-        /* transparent pixels have a color too, so that filtering shows no dark fringe */
         for (int c = 0; c < 3; c++)
-            txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered
-                                                    : 0.85f * s->species->leaf_color[c]);
+            txm_image_set(&s->out, x, y, c, covered ? sum[c] / (float)covered : 0);
         txm_image_set(&s->out, x, y, 3, (float)covered / (TPC_SAMPLES * TPC_SAMPLES));
     }
 }
@@ -4491,7 +4534,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
         else txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
     }
     txm_free(env, spray.marks);
-    return status;
+    return status == TXM_OK ? txm_image_bleed(&spray.out, 0, env) : status;
 }
 
 /* ---- foliage: impostors -------------------------------------------------------------------- */
@@ -4600,7 +4643,7 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
     }
     for (int i = 0; i < desc->card_count; i++)
         tpc_draw_card(desc, &desc->cards[i], &leaves, &c, &d);
-    return TXM_OK;
+    return txm_image_bleed(&c, 0, env);
 }
 
 /* ---- baked meshes ------------------------------------------------------------------------ */

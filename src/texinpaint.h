@@ -5,7 +5,8 @@
      Fills a hole in the texture of a mesh, across the seams of its atlas, or a hole in a plain
      picture: first the lines that end at the hole are continued through it, then the texture is
      completed along these lines, then everywhere else, from pieces of the surroundings [1]. Further
-     maps (normals, roughness, labels) are completed from the same pieces. No known texel changes.
+     maps (normals, roughness, labels) are completed from the same pieces. No known texel changes, but
+     for the colour of transparent ones, which is bled from the visible ones near by.
 
    QUICK START                                 (tests build and run this very block)
      // Remove a disc from a striped picture. cc -std=c99 quick.c -lm

@@ -399,6 +399,7 @@ TEXINPAINT_API txm_status texinpaint_harmonic(const texinpaint_desc *desc, txm_e
         }
         status = txi_gutter(&d, &arena, env, &filled);
     }
+    if (status == TXM_OK) status = txi_bleed(&d, env);
     if (status == TXM_OK) txi_deliver(&d, out);
     txm_arena_free(&arena);
     return status;

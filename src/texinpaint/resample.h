@@ -178,6 +178,14 @@ static int txi_has_alpha(const txi_domain *d, int map) {
     return !(kind && (kind->is_normal || kind->is_label)) && d->maps[map].channels % 2 == 0;
 }
 
+/* Continue the visible colours of all maps into what is transparent. */
+static txm_status txi_bleed(const txi_domain *d, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int map = 0; map < d->map_count && status == TXM_OK; map++)
+        if (txi_has_alpha(d, map)) status = txm_image_bleed(&d->maps[map], 0, env);
+    return status;
+}
+
 /* A channel of a texel; colours times their alpha, if has_alpha. */
 static double txi_texel_value(const txm_image *image, int has_alpha, int64_t texel, int c) {
     const int x = (int)(texel % image->width), y = (int)(texel / image->width),
