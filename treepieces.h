@@ -619,8 +619,7 @@ TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc);
 
 /* Draw the sheet. out is 8 tiles wide and 8 tiles per layer high, the layers one below the other,
    with the channels and sample type of the tiles. The last of 2 or 4 channels is alpha: colours are
-   blended as far as they show, and hidden ones are bled from visible neighbours; after
-   TXM_OUT_OF_MEMORY only that is missing. */
+   blended as far as they show, and hidden ones are bled from visible neighbours. */
 TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
                                           txm_image out);
 
@@ -650,8 +649,8 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
                                     treepieces_card *cards);
 
 /* Draw a spray of leaves procedurally, as the RGBA image of the cards. out: any size, 4 channels of
-   8 bits; where it is transparent it has the colour of the leaves near by, so that filters show no
-   fringe. Partly drawn after TXM_CANCELLED; without such colours after TXM_OUT_OF_MEMORY. */
+   8 bits, untouched after an error; where it is transparent it has the colour of the leaves near
+   by, so that filters show no fringe. */
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out);
 
@@ -661,8 +660,8 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
    leaves     their image, RGBA, 8 bits; texels with alpha below 1/2 are transparent
    right, up, forward  axes of the view: orthogonal unit vectors; forward points away from the eye
    color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255.
-              Covers -1..1 along right and up. Where alpha is 0 the colour is that of cards near by
-              (but after TXM_OUT_OF_MEMORY), for filters
+              Covers -1..1 along right and up. Where alpha is 0 the colour is that of cards near by,
+              for filters
    depth      float, 1 channel, size of color: distance from the centre of the cloud towards the eye, in
               radii of the cloud; -2 where there is nothing                                      */
 typedef struct treepieces_impostor_desc {
@@ -3655,6 +3654,30 @@ TREEPIECES_API void treepieces_patch_point(const float positions[12], const floa
     memcpy(normal, n, sizeof n);
 }
 
+/* ---- pictures with hidden colours ---------------------------------------------------------- */
+
+/* A picture of the form of out in the arena, to be drawn and then delivered. */
+static txm_status tpc_new_picture(const txm_image *out, txm_arena *arena, txm_env *env,
+                                  txm_image *picture) {
+    *picture = *out;
+    picture->stride = 0;
+    *picture = txm_image_resolve(*picture);
+    picture->pixels = txm_arena_alloc(arena, (size_t)picture->height, (size_t)picture->stride);
+    return picture->pixels ? TXM_OK : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a picture");
+}
+
+static void tpc_copy_picture(const txm_image *picture, const txm_image *out) {
+    for (int y = 0; y < picture->height; y++)
+        memcpy(txm_image_row(out, y), txm_image_row_const(picture, y), (size_t)picture->stride);
+}
+
+/* Bleed hidden colours and copy the picture to out, which is untouched after an error. */
+static txm_status tpc_deliver(const txm_image *picture, const txm_image *out, txm_env *env) {
+    const txm_status status = txm_image_bleed(picture, 0, env);
+    if (status == TXM_OK) tpc_copy_picture(picture, out);
+    return status;
+}
+
 /* ---- bark: sheets of framed tiles --------------------------------------------------------- */
 
 TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc) {
@@ -3852,12 +3875,19 @@ static void tpc_draw_layer(const treepieces_bark_desc *d, const txm_image *out, 
 
 TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
                                           txm_image out) {
-    const txm_status status = tpc_check_bark(desc, &out, env);
+    txm_status status = tpc_check_bark(desc, &out, env);
     if (status != TXM_OK) return status;
     const txm_image o = txm_image_resolve(out);
-    const int layers = treepieces_bark_layers(desc);
-    for (int layer = 0; layer < layers; layer++) tpc_draw_layer(desc, &o, layer);
-    return txm_image_bleed(&o, 0, env);
+    txm_image picture = o;
+    const int layers = treepieces_bark_layers(desc), has_alpha = txm_image_has_alpha(&o);
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    if (has_alpha) status = tpc_new_picture(&o, &arena, env, &picture);
+    for (int layer = 0; layer < layers && status == TXM_OK; layer++)
+        tpc_draw_layer(desc, &picture, layer);
+    if (has_alpha && status == TXM_OK) status = tpc_deliver(&picture, &o, env);
+    txm_arena_free(&arena);
+    return status;
 }
 
 TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,
@@ -4519,22 +4549,26 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     if (status != TXM_OK) return status;
     if (out.channels != 4 || out.sample != TXM_U8)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out must have 4 channels of 8 bits");
+    txm_arena arena;
+    txm_arena_init(&arena, env);
     memset(&spray, 0, sizeof spray);
-    spray.marks = (tpc_mark *)txm_alloc(env, TPC_MARKS * sizeof *spray.marks);
-    if (!spray.marks) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
+    out = txm_image_resolve(out);
+    spray.marks = (tpc_mark *)txm_arena_alloc(&arena, TPC_MARKS, sizeof *spray.marks);
+    status = spray.marks ? tpc_new_picture(&out, &arena, env, &spray.out)
+                         : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
     spray.species = species;
     spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
     spray.rng = txm_rng_make(seed, 0x59a7);
-    spray.out = txm_image_resolve(out);
-    tpc_make_spray(&spray);
+    if (status == TXM_OK) tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
         if (txm_progress(env, (float)y / (float)out.height, "leaves"))
             status = txm_fail(env, TXM_CANCELLED, "cancelled");
         else txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
     }
-    txm_free(env, spray.marks);
-    return status == TXM_OK ? txm_image_bleed(&spray.out, 0, env) : status;
+    if (status == TXM_OK) status = tpc_deliver(&spray.out, &out, env);
+    txm_arena_free(&arena);
+    return status;
 }
 
 /* ---- foliage: impostors -------------------------------------------------------------------- */
@@ -4608,6 +4642,16 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     }
 }
 
+static void tpc_draw_cloud(const treepieces_impostor_desc *d, const txm_image *leaves,
+                           const txm_image *color, const txm_image *depth) {
+    memset(color->pixels, 0, 4 * (size_t)color->width * (size_t)color->height);
+    for (int y = 0; y < depth->height; y++) {
+        float *row = (float *)txm_image_row(depth, y);
+        for (int x = 0; x < depth->width; x++) row[x] = -2;
+    }
+    for (int i = 0; i < d->card_count; i++) tpc_draw_card(d, &d->cards[i], leaves, color, depth);
+}
+
 /* Are the axes orthogonal unit vectors, and is light of unit length? */
 static int tpc_is_view(const treepieces_impostor_desc *d) {
     const float *v[4] = {d->right, d->up, d->forward, d->light};
@@ -4636,14 +4680,18 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "right, up, forward and light must be unit vectors, the first three "
                         "orthogonal");
-    for (int y = 0; y < c.height; y++) {
-        float *depths = (float *)txm_image_row(&d, y);
-        memset(txm_image_row(&c, y), 0, 4 * (size_t)c.width);
-        for (int x = 0; x < d.width; x++) depths[x] = -2;
+    txm_image colors, depths;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    status = tpc_new_picture(&c, &arena, env, &colors);
+    if (status == TXM_OK) status = tpc_new_picture(&d, &arena, env, &depths);
+    if (status == TXM_OK) {
+        tpc_draw_cloud(desc, &leaves, &colors, &depths);
+        status = tpc_deliver(&colors, &c, env);
     }
-    for (int i = 0; i < desc->card_count; i++)
-        tpc_draw_card(desc, &desc->cards[i], &leaves, &c, &d);
-    return txm_image_bleed(&c, 0, env);
+    if (status == TXM_OK) tpc_copy_picture(&depths, &d);
+    txm_arena_free(&arena);
+    return status;
 }
 
 /* ---- baked meshes ------------------------------------------------------------------------ */

@@ -619,8 +619,7 @@ TREEPIECES_API int treepieces_bark_layers(const treepieces_bark_desc *desc);
 
 /* Draw the sheet. out is 8 tiles wide and 8 tiles per layer high, the layers one below the other,
    with the channels and sample type of the tiles. The last of 2 or 4 channels is alpha: colours are
-   blended as far as they show, and hidden ones are bled from visible neighbours; after
-   TXM_OUT_OF_MEMORY only that is missing. */
+   blended as far as they show, and hidden ones are bled from visible neighbours. */
 TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
                                           txm_image out);
 
@@ -650,8 +649,8 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
                                     treepieces_card *cards);
 
 /* Draw a spray of leaves procedurally, as the RGBA image of the cards. out: any size, 4 channels of
-   8 bits; where it is transparent it has the colour of the leaves near by, so that filters show no
-   fringe. Partly drawn after TXM_CANCELLED; without such colours after TXM_OUT_OF_MEMORY. */
+   8 bits, untouched after an error; where it is transparent it has the colour of the leaves near
+   by, so that filters show no fringe. */
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
                                                  txm_env *env, txm_image out);
 
@@ -661,8 +660,8 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
    leaves     their image, RGBA, 8 bits; texels with alpha below 1/2 are transparent
    right, up, forward  axes of the view: orthogonal unit vectors; forward points away from the eye
    color      RGBA, 8 bits: sRGB, shaded by `light` (unit vector towards the light); alpha 0 or 255.
-              Covers -1..1 along right and up. Where alpha is 0 the colour is that of cards near by
-              (but after TXM_OUT_OF_MEMORY), for filters
+              Covers -1..1 along right and up. Where alpha is 0 the colour is that of cards near by,
+              for filters
    depth      float, 1 channel, size of color: distance from the centre of the cloud towards the eye, in
               radii of the cloud; -2 where there is nothing                                      */
 typedef struct treepieces_impostor_desc {
@@ -701,6 +700,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #include "treepieces/wind.h"
 #include "treepieces/bones.h"
 #include "treepieces/tessellation.h"
+#include "treepieces/picture.h"
 #include "treepieces/bark.h"
 #include "treepieces/cloud.h"
 #include "treepieces/spray.h"

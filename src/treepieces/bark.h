@@ -1,7 +1,7 @@
 #ifndef TREEPIECES_BARK_H
 #define TREEPIECES_BARK_H
 
-#include "../treepieces.h"
+#include "picture.h"
 
 /* ---- bark: sheets of framed tiles --------------------------------------------------------- */
 
@@ -200,12 +200,19 @@ static void tpc_draw_layer(const treepieces_bark_desc *d, const txm_image *out, 
 
 TREEPIECES_API txm_status treepieces_bark(const treepieces_bark_desc *desc, txm_env *env,
                                           txm_image out) {
-    const txm_status status = tpc_check_bark(desc, &out, env);
+    txm_status status = tpc_check_bark(desc, &out, env);
     if (status != TXM_OK) return status;
     const txm_image o = txm_image_resolve(out);
-    const int layers = treepieces_bark_layers(desc);
-    for (int layer = 0; layer < layers; layer++) tpc_draw_layer(desc, &o, layer);
-    return txm_image_bleed(&o, 0, env);
+    txm_image picture = o;
+    const int layers = treepieces_bark_layers(desc), has_alpha = txm_image_has_alpha(&o);
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    if (has_alpha) status = tpc_new_picture(&o, &arena, env, &picture);
+    for (int layer = 0; layer < layers && status == TXM_OK; layer++)
+        tpc_draw_layer(desc, &picture, layer);
+    if (has_alpha && status == TXM_OK) status = tpc_deliver(&picture, &o, env);
+    txm_arena_free(&arena);
+    return status;
 }
 
 TREEPIECES_API int treepieces_quad_uv(const treepieces_quad *quad, uint32_t bands, int cell,

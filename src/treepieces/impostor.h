@@ -1,6 +1,7 @@
 #ifndef TREEPIECES_IMPOSTOR_H
 #define TREEPIECES_IMPOSTOR_H
 
+#include "picture.h"
 #include "rim.h"
 
 /* ---- foliage: impostors -------------------------------------------------------------------- */
@@ -74,6 +75,16 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
     }
 }
 
+static void tpc_draw_cloud(const treepieces_impostor_desc *d, const txm_image *leaves,
+                           const txm_image *color, const txm_image *depth) {
+    memset(color->pixels, 0, 4 * (size_t)color->width * (size_t)color->height);
+    for (int y = 0; y < depth->height; y++) {
+        float *row = (float *)txm_image_row(depth, y);
+        for (int x = 0; x < depth->width; x++) row[x] = -2;
+    }
+    for (int i = 0; i < d->card_count; i++) tpc_draw_card(d, &d->cards[i], leaves, color, depth);
+}
+
 /* Are the axes orthogonal unit vectors, and is light of unit length? */
 static int tpc_is_view(const treepieces_impostor_desc *d) {
     const float *v[4] = {d->right, d->up, d->forward, d->light};
@@ -102,14 +113,18 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "right, up, forward and light must be unit vectors, the first three "
                         "orthogonal");
-    for (int y = 0; y < c.height; y++) {
-        float *depths = (float *)txm_image_row(&d, y);
-        memset(txm_image_row(&c, y), 0, 4 * (size_t)c.width);
-        for (int x = 0; x < d.width; x++) depths[x] = -2;
+    txm_image colors, depths;
+    txm_arena arena;
+    txm_arena_init(&arena, env);
+    status = tpc_new_picture(&c, &arena, env, &colors);
+    if (status == TXM_OK) status = tpc_new_picture(&d, &arena, env, &depths);
+    if (status == TXM_OK) {
+        tpc_draw_cloud(desc, &leaves, &colors, &depths);
+        status = tpc_deliver(&colors, &c, env);
     }
-    for (int i = 0; i < desc->card_count; i++)
-        tpc_draw_card(desc, &desc->cards[i], &leaves, &c, &d);
-    return txm_image_bleed(&c, 0, env);
+    if (status == TXM_OK) tpc_copy_picture(&depths, &d);
+    txm_arena_free(&arena);
+    return status;
 }
 
 #endif /* TREEPIECES_IMPOSTOR_H */

@@ -404,22 +404,26 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     if (status != TXM_OK) return status;
     if (out.channels != 4 || out.sample != TXM_U8)
         return txm_fail(env, TXM_BAD_ARGUMENT, "out must have 4 channels of 8 bits");
+    txm_arena arena;
+    txm_arena_init(&arena, env);
     memset(&spray, 0, sizeof spray);
-    spray.marks = (tpc_mark *)txm_alloc(env, TPC_MARKS * sizeof *spray.marks);
-    if (!spray.marks) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
+    out = txm_image_resolve(out);
+    spray.marks = (tpc_mark *)txm_arena_alloc(&arena, TPC_MARKS, sizeof *spray.marks);
+    status = spray.marks ? tpc_new_picture(&out, &arena, env, &spray.out)
+                         : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
     spray.species = species;
     spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
     spray.rng = txm_rng_make(seed, 0x59a7);
-    spray.out = txm_image_resolve(out);
-    tpc_make_spray(&spray);
+    if (status == TXM_OK) tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
         if (txm_progress(env, (float)y / (float)out.height, "leaves"))
             status = txm_fail(env, TXM_CANCELLED, "cancelled");
         else txm_parallel_for(env, txm_clampi(out.height - y, 0, ROWS), tpc_draw_row, &spray);
     }
-    txm_free(env, spray.marks);
-    return status == TXM_OK ? txm_image_bleed(&spray.out, 0, env) : status;
+    if (status == TXM_OK) status = tpc_deliver(&spray.out, &out, env);
+    txm_arena_free(&arena);
+    return status;
 }
 
 #endif /* TREEPIECES_SPRAY_H */
