@@ -161,7 +161,7 @@ typedef struct texsyn_learn_desc {
     int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Levels other than
                           the coarsest use pairs of at most 10 of their pixels                   */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
-                          36 for a gray example                                                   */
+                          36 for a gray example or one with transparent pixels                   */
     int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
                           fewer are made if a level would be under 8 px or hold little of a mask  */
     float threshold;   /* types whose histograms differ by less than this, or by less than the

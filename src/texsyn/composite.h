@@ -75,7 +75,7 @@ static void txs_composite_blank(texsyn_model *m, int index) {
         l->low[b] = 0;
         l->step[b] = 1;
         t->share[0] = TXS_ONE;
-        txs_make_classes(l, b);
+        txs_make_classes(m, l, b);
     }
 }
 

@@ -66,6 +66,7 @@ enum {
     TXS_INTEGRAL = 40,      /* docs/choices.md                                               */
     TXS_TYPES = 24,      /* added per level unless the caller says otherwise                 */
     TXS_TYPES_GRAY = 36, /* if there is only one band                                       */
+    TXS_TYPES_CUTOUT = 36, /* if some colours are hidden: shapes and colours take their share */
     TXS_COARSE = 8,      /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
     TXS_STEEPEST = 20,   /* such steps: the largest stored potential                         */
     TXS_UNSEEN = 1,      /* such steps: the potential of a bin that has none stored          */

@@ -18,11 +18,6 @@ typedef struct txs_source { /* one level of the example */
     int step;          /* statistics are taken from every step-th row          */
 } txs_source;
 
-/* Is it the band of alpha? */
-static int txs_is_alpha(const texsyn_model *m, int band) {
-    return m->channels == 4 && m->basis[band][3] != 0;
-}
-
 /* Alpha becomes the first band, the one whose shapes are learned. */
 static void txs_put_alpha_first(texsyn_model *m) {
     for (int b = m->bands - 1; b > 0; b--) {

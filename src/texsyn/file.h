@@ -326,7 +326,7 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             if (k < m->bands) t->band = t->other = k; /* singles, in the order of the bands */
             else txs_code_type(c, z, t, m, i);
             if (!c->bad) txs_code_statistics(c, z, l, i, k);
-            if (k < m->bands && !c->bad) txs_make_classes(l, k);
+            if (k < m->bands && !c->bad) txs_make_classes(m, l, k);
         }
         int filters = 0;
         for (int k = 0; k < l->type_count && !c->bad; k++)

@@ -157,7 +157,8 @@ static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
     }
 }
 
-/* The bands of a texture: principal components of its visible colours; alpha is a band if it varies.
+/* The bands of a texture: principal components of its visible colours; alpha is a band if it varies,
+   the first one if something is hidden.
    mask: a byte for each pixel of the picture, not 0 where the texture is; becomes the weights. If
    nothing is visible there is one band, in which everything is 0. */
 static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t *mask) {
@@ -185,6 +186,7 @@ static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t
     s.weight = partial ? mask : NULL;
     txs_find_bands(m, im, &s);
     if (hidden && !txs_is_alpha(m, m->bands - 1)) m->basis[m->bands++][3] = 1;
+    if (hidden) txs_put_alpha_first(m);
 }
 
 /* Those of the source pixels of a label; im is as large as the ground. mask: scratch, as above. */

@@ -297,11 +297,30 @@ static int txs_bin(const txs_tally *y, const uint8_t *p) {
     }
 }
 
-/* Classes of a band's values: quantiles with narrow tails, so that rare values keep their say. */
-static void txs_make_classes(txs_level *level, int band) {
+/* Is it the band of alpha? */
+static int txs_is_alpha(const texsyn_model *m, int band) {
+    return m->channels == 4 && m->basis[band][3] != 0;
+}
+
+/* Classes of alpha's values: hidden, opaque, and evenly what lies between. */
+static void txs_make_alpha_classes(txs_level *level, int band) {
+    const int last = level->values[band] - 1, between = TXS_CLASSES - 2;
+    for (int v = 0; v < TXS_VALUES; v++) {
+        const int k = v == 0 ? 0 : v >= last ? between + 1 : 1 + (v - 1) * between / (last - 1);
+        level->classes[band][v] = (uint8_t)k;
+    }
+}
+
+/* Classes of a band's values: quantiles with narrow tails, so that rare values keep their say. Where
+   alpha is the first band, quantiles would not tell its soft rims from what is opaque. */
+static void txs_make_classes(const texsyn_model *m, txs_level *level, int band) {
     static const int cut[TXS_CLASSES - 1] = {655, 3277, 13107, 26214, 39322, 52429, 62259, 64881};
     const int32_t *share = level->types[band].share;
     int64_t below = 0;
+    if (band == 0 && txs_is_alpha(m, band)) {
+        txs_make_alpha_classes(level, band);
+        return;
+    }
     for (int v = 0; v < TXS_VALUES; v++) {
         int k = 0;
         while (k < TXS_CLASSES - 1 && below + share[v] / 2 > cut[k]) k++;

@@ -235,7 +235,7 @@ static void txs_study_preselect(txs_study *s, int label) {
     for (int b = 0; b < bands; b++) {
         txs_type *t = txs_add_type(level, TEXSYN_SINGLE, b, b, 0, 0);
         txs_study_target(s, label, t, t->share);
-        txs_make_classes(level, b);
+        txs_make_classes(model, level, b);
     }
     for (int b = 0; b < bands; b++) {
         for (int phase = has_parents; phase <= 2 * has_parents; phase++) {

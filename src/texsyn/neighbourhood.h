@@ -357,7 +357,7 @@ static void txs_preselect(txs_learner *a) {
         txs_type *t = txs_add_type(a->level, TEXSYN_SINGLE, b, b, 0, 0);
         const txs_stencil stencil = txs_stencil_of(a, t);
         txs_measure(&a->source->canvas, &stencil, 1, bands, a->level, t, t->share);
-        txs_make_classes(a->level, b);
+        txs_make_classes(a->model, a->level, b);
     }
     for (int b = 0; b < bands; b++) {
         const int top = a->index + 1 == a->model->levels;
@@ -416,6 +416,7 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
                                   float to) {
     const int max_types = a->desc->max_types     ? a->desc->max_types
                           : a->model->bands == 1 ? TXS_TYPES_GRAY
+                          : a->source->weight    ? TXS_TYPES_CUTOUT
                                                  : TXS_TYPES;
     const float threshold = a->desc->threshold > 0 ? a->desc->threshold : TXS_THRESHOLD;
     const int max_distance = a->desc->max_distance ? a->desc->max_distance : 40;
