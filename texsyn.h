@@ -161,7 +161,7 @@ typedef struct texsyn_learn_desc {
     int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Levels other than
                           the coarsest use pairs of at most 10 of their pixels                   */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
-                          36 for a gray example                                                   */
+                          36 for a gray example or one with transparent pixels                   */
     int levels;        /* pyramid levels, 1..6; 0 = as many as leave the short side about 64 px;
                           fewer are made if a level would be under 8 px or hold little of a mask  */
     float threshold;   /* types whose histograms differ by less than this, or by less than the
@@ -644,6 +644,7 @@ enum {
     TXS_INTEGRAL = 40,      /* docs/choices.md                                               */
     TXS_TYPES = 24,      /* added per level unless the caller says otherwise                 */
     TXS_TYPES_GRAY = 36, /* if there is only one band                                       */
+    TXS_TYPES_CUTOUT = 36, /* if some colours are hidden: shapes and colours take their share */
     TXS_COARSE = 8,      /* 1/TXS_NAT nat: steps of a stored potential; the control refines  */
     TXS_STEEPEST = 20,   /* such steps: the largest stored potential                         */
     TXS_UNSEEN = 1,      /* such steps: the potential of a bin that has none stored          */
@@ -729,6 +730,13 @@ enum {
 /* The weight of a colour whose alpha is that: 0 only if it is hidden. */
 static uint8_t txs_weight_of(double alpha) {
     return (uint8_t)(alpha > 0 ? (alpha < 1 ? ceil(alpha * TXS_OPAQUE) : (int)TXS_OPAQUE) : 0);
+}
+
+/* How often a clique is counted whose least weight is that: fully from a quarter of the opacity on.
+   Colours of thin veils belong to their alpha, with which they are counted in full; only what is
+   faint is left out gradually. */
+static uint32_t txs_counts_of(uint32_t least) {
+    return 4 * least < TXS_OPAQUE ? 4 * least : (uint32_t)TXS_OPAQUE;
 }
 
 /* The weights of a picture's pixels. mask: NULL, or a byte for each pixel, 0 where it does not
@@ -1118,11 +1126,30 @@ static int txs_bin(const txs_tally *y, const uint8_t *p) {
     }
 }
 
-/* Classes of a band's values: quantiles with narrow tails, so that rare values keep their say. */
-static void txs_make_classes(txs_level *level, int band) {
+/* Is it the band of alpha? */
+static int txs_is_alpha(const texsyn_model *m, int band) {
+    return m->channels == 4 && m->basis[band][3] != 0;
+}
+
+/* Classes of alpha's values: hidden, opaque, and evenly what lies between. */
+static void txs_make_alpha_classes(txs_level *level, int band) {
+    const int last = level->values[band] - 1, between = TXS_CLASSES - 2;
+    for (int v = 0; v < TXS_VALUES; v++) {
+        const int k = v == 0 ? 0 : v >= last ? between + 1 : 1 + (v - 1) * between / (last - 1);
+        level->classes[band][v] = (uint8_t)k;
+    }
+}
+
+/* Classes of a band's values: quantiles with narrow tails, so that rare values keep their say. Where
+   alpha is the first band, quantiles would not tell its soft rims from what is opaque. */
+static void txs_make_classes(const texsyn_model *m, txs_level *level, int band) {
     static const int cut[TXS_CLASSES - 1] = {655, 3277, 13107, 26214, 39322, 52429, 62259, 64881};
     const int32_t *share = level->types[band].share;
     int64_t below = 0;
+    if (band == 0 && txs_is_alpha(m, band)) {
+        txs_make_alpha_classes(level, band);
+        return;
+    }
     for (int v = 0; v < TXS_VALUES; v++) {
         int k = 0;
         while (k < TXS_CLASSES - 1 && below + share[v] / 2 > cut[k]) k++;
@@ -2194,11 +2221,6 @@ typedef struct txs_source { /* one level of the example */
     int step;          /* statistics are taken from every step-th row          */
 } txs_source;
 
-/* Is it the band of alpha? */
-static int txs_is_alpha(const texsyn_model *m, int band) {
-    return m->channels == 4 && m->basis[band][3] != 0;
-}
-
 /* Alpha becomes the first band, the one whose shapes are learned. */
 static void txs_put_alpha_first(texsyn_model *m) {
     for (int b = m->bands - 1; b > 0; b--) {
@@ -2556,7 +2578,7 @@ static uint32_t txs_clique_weight(const txs_stencil *s, int at[TXS_MAX_MEMBERS][
         if (s->mask && !s->mask[p]) least = 0;
         if (s->weight && s->weight[p] < least) least = s->weight[p];
     }
-    return least;
+    return s->weight ? txs_counts_of(least) : least;
 }
 
 /* Histogram of a clique type over a canvas: of the example (stencil), cliques that lie inside it and
@@ -2862,7 +2884,7 @@ static void txs_preselect(txs_learner *a) {
         txs_type *t = txs_add_type(a->level, TEXSYN_SINGLE, b, b, 0, 0);
         const txs_stencil stencil = txs_stencil_of(a, t);
         txs_measure(&a->source->canvas, &stencil, 1, bands, a->level, t, t->share);
-        txs_make_classes(a->level, b);
+        txs_make_classes(a->model, a->level, b);
     }
     for (int b = 0; b < bands; b++) {
         const int top = a->index + 1 == a->model->levels;
@@ -2921,6 +2943,7 @@ static txm_status txs_learn_level(txs_learner *a, const int16_t *noise, txm_env 
                                   float to) {
     const int max_types = a->desc->max_types     ? a->desc->max_types
                           : a->model->bands == 1 ? TXS_TYPES_GRAY
+                          : a->source->weight    ? TXS_TYPES_CUTOUT
                                                  : TXS_TYPES;
     const float threshold = a->desc->threshold > 0 ? a->desc->threshold : TXS_THRESHOLD;
     const int max_distance = a->desc->max_distance ? a->desc->max_distance : 40;
@@ -3311,7 +3334,7 @@ static int txs_code_model(txs_coder *c, texsyn_model *m, txs_codec *z) {
             if (k < m->bands) t->band = t->other = k; /* singles, in the order of the bands */
             else txs_code_type(c, z, t, m, i);
             if (!c->bad) txs_code_statistics(c, z, l, i, k);
-            if (k < m->bands && !c->bad) txs_make_classes(l, k);
+            if (k < m->bands && !c->bad) txs_make_classes(m, l, k);
         }
         int filters = 0;
         for (int k = 0; k < l->type_count && !c->bad; k++)
@@ -4097,7 +4120,8 @@ static void txs_ground_halve(const txs_ground *fine, txs_ground *coarse) {
     }
 }
 
-/* The bands of a texture: principal components of its visible colours; alpha is a band if it varies.
+/* The bands of a texture: principal components of its visible colours; alpha is a band if it varies,
+   the first one if something is hidden.
    mask: a byte for each pixel of the picture, not 0 where the texture is; becomes the weights. If
    nothing is visible there is one band, in which everything is 0. */
 static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t *mask) {
@@ -4125,6 +4149,7 @@ static void txs_find_visible_bands(texsyn_model *m, const txm_image *im, uint8_t
     s.weight = partial ? mask : NULL;
     txs_find_bands(m, im, &s);
     if (hidden && !txs_is_alpha(m, m->bands - 1)) m->basis[m->bands++][3] = 1;
+    if (hidden) txs_put_alpha_first(m);
 }
 
 /* Those of the source pixels of a label; im is as large as the ground. mask: scratch, as above. */
@@ -5151,8 +5176,8 @@ static int64_t txs_study_weigh(const txs_mosaic *m, const txs_pixels *tails, int
             const uint32_t weight = p[m->weight + at[k][1] * m->canvas.stride + at[k][0]];
             least = weight < least ? weight : least;
         }
-        h[txs_bin(&y, p)] += least;
-        total += least;
+        h[txs_bin(&y, p)] += txs_counts_of(least);
+        total += txs_counts_of(least);
     }
     txs_normalise(h, total, share);
     return (total + TXS_OPAQUE - 1) / TXS_OPAQUE;
@@ -5296,7 +5321,7 @@ static void txs_study_preselect(txs_study *s, int label) {
     for (int b = 0; b < bands; b++) {
         txs_type *t = txs_add_type(level, TEXSYN_SINGLE, b, b, 0, 0);
         txs_study_target(s, label, t, t->share);
-        txs_make_classes(level, b);
+        txs_make_classes(model, level, b);
     }
     for (int b = 0; b < bands; b++) {
         for (int phase = has_parents; phase <= 2 * has_parents; phase++) {
@@ -10244,7 +10269,7 @@ static void txs_composite_blank(texsyn_model *m, int index) {
         l->low[b] = 0;
         l->step[b] = 1;
         t->share[0] = TXS_ONE;
-        txs_make_classes(l, b);
+        txs_make_classes(m, l, b);
     }
 }
 

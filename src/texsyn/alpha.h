@@ -22,6 +22,13 @@ static uint8_t txs_weight_of(double alpha) {
     return (uint8_t)(alpha > 0 ? (alpha < 1 ? ceil(alpha * TXS_OPAQUE) : (int)TXS_OPAQUE) : 0);
 }
 
+/* How often a clique is counted whose least weight is that: fully from a quarter of the opacity on.
+   Colours of thin veils belong to their alpha, with which they are counted in full; only what is
+   faint is left out gradually. */
+static uint32_t txs_counts_of(uint32_t least) {
+    return 4 * least < TXS_OPAQUE ? 4 * least : (uint32_t)TXS_OPAQUE;
+}
+
 /* The weights of a picture's pixels. mask: NULL, or a byte for each pixel, 0 where it does not
    count; its weight is 0. Returns 0 if all that count are opaque, so that there is no need of
    weights. */

@@ -90,8 +90,8 @@ static int64_t txs_study_weigh(const txs_mosaic *m, const txs_pixels *tails, int
             const uint32_t weight = p[m->weight + at[k][1] * m->canvas.stride + at[k][0]];
             least = weight < least ? weight : least;
         }
-        h[txs_bin(&y, p)] += least;
-        total += least;
+        h[txs_bin(&y, p)] += txs_counts_of(least);
+        total += txs_counts_of(least);
     }
     txs_normalise(h, total, share);
     return (total + TXS_OPAQUE - 1) / TXS_OPAQUE;

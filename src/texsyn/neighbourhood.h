@@ -51,7 +51,7 @@ static uint32_t txs_clique_weight(const txs_stencil *s, int at[TXS_MAX_MEMBERS][
         if (s->mask && !s->mask[p]) least = 0;
         if (s->weight && s->weight[p] < least) least = s->weight[p];
     }
-    return least;
+    return s->weight ? txs_counts_of(least) : least;
 }
 
 /* Histogram of a clique type over a canvas: of the example (stencil), cliques that lie inside it and
