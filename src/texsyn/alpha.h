@@ -19,7 +19,7 @@ enum {
 
 /* The weight of a colour whose alpha is that: 0 only if it is hidden. */
 static uint8_t txs_weight_of(double alpha) {
-    return (uint8_t)(alpha > 0 ? (alpha < 1 ? ceil(alpha * TXS_OPAQUE) : (int)TXS_OPAQUE) : 0);
+    return (uint8_t)(alpha > 0 ? (alpha < 1 ? ceil(alpha * (double)TXS_OPAQUE) : (int)TXS_OPAQUE) : 0);
 }
 
 /* How often a clique is counted whose least weight is that: fully from a quarter of the opacity on.
