@@ -1,6 +1,7 @@
 #!/bin/sh
-# Loaders of models and composites against hostile bytes, and public calls against pictures of all kinds: a
-# few thousand here, many more with FULL=1.
+# Loaders of models and composites against hostile bytes, and public calls against pictures, masks and
+# options of all kinds: for each program as many runs as take some 20 s here, ten times as many with
+# FULL=1, from seed SEED. tests/wide/fuzz/fuzzkit.h tells more.
 . tests/kit/tap.sh
 
 mkdir "$tmp/seeds"
@@ -13,27 +14,34 @@ done
 build/texkit composite "$tmp/parts.png" --labels "$tmp/parts-labels.png" -o "$tmp/c.png" --size 9x9 \
     --types 3 --save "$tmp/seeds/parts.txc" --quiet
 
-runs=20000
-[ "$FULL" = 1 ] && runs=60000
-check "builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off -I. \
-    tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_standalone" -lm &&
-    check "$runs mutated models and composites" "$OUT/fuzz_standalone" $runs "$tmp"/seeds/*
-
-# build NAME: fuzz_texsyn_NAME, which uses public calls alone, with the object of the unit tests
-build() {
+# fuzz NAME RUNS [ARGUMENT...]: fuzz_NAME.c with the object of the unit tests of its module, but for
+# those that have none or look inside; the other arguments go to the program
+fuzz() {
+    name=$1 module=${1%%_*} runs=$2
+    shift 2
+    [ "$FULL" = 1 ] && runs=${runs}0
+    with="$OUT/modules/$module.o -D$(echo "$module" | tr '[:lower:]' '[:upper:]')_IMPLEMENTED"
+    case $name in texsyn_load | texmath) with= ;; esac
     # shellcheck disable=SC2086 # flags are words
-    check "fuzz_texsyn_$1 builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -DTEXSYN_IMPLEMENTED \
-        -ffp-contract=off -I. "tests/wide/fuzz/fuzz_texsyn_$1.c" "$OUT/modules/texsyn.o" -o "$OUT/fuzz_$1" -lm
+    check "fuzz_$name builds by itself" $CC -std=gnu99 $SANITIZE -DFUZZ_STANDALONE -ffp-contract=off \
+        -I. -Itests/kit "tests/wide/fuzz/fuzz_$name.c" $with -o "$OUT/fuzz_$name" -lm &&
+        check "$runs runs of fuzz_$name" "$OUT/fuzz_$name" $runs "$@"
 }
-runs=100
-[ "$FULL" = 1 ] && runs=500
-build weather && check "$runs pictures into relighting and erosion" "$OUT/fuzz_weather" $runs
-build fill && check "$runs random fillings" "$OUT/fuzz_fill" $runs
-build knit && check "$runs random knits" "$OUT/fuzz_knit" $runs
-build segment && check "$runs random segmentations" "$OUT/fuzz_segment" $runs
+fuzz texsyn_load 20000 "$tmp"/seeds/*
+fuzz texsyn_weather 150
+fuzz texsyn_fill 150
+fuzz texsyn_knit 150
+fuzz texsyn_segment 60
+fuzz texsyn_learn 100 "${SEED:-1}"
+fuzz texpatch 250 "${SEED:-1}"
+fuzz texedges 10000 "${SEED:-1}"
+fuzz textiles 600 "${SEED:-1}"
+fuzz texmath 20000 "${SEED:-1}"
+fuzz texinpaint 100
 
+# libFuzzer follows what the loader does with its bytes
 if [ "$FULL" = 1 ] && has clang; then
-    check "builds with libFuzzer" clang -std=gnu99 -O2 -g -ffp-contract=off \
+    check "fuzz_texsyn_load builds with libFuzzer" clang -std=gnu99 -O1 -g -ffp-contract=off \
         -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined -I. \
         tests/wide/fuzz/fuzz_texsyn_load.c -o "$OUT/fuzz_libfuzzer" -lm &&
         check "300,000 runs of libFuzzer" "$OUT/fuzz_libfuzzer" -runs=300000 -seed=1 \

@@ -7,9 +7,9 @@
    The bytes choose size, channels, depth, strides, kind of mask and source, quality, and which
    allocation fails. Known pixels must come out as they went in, and nothing after an error.     */
 #define TEXSYN_IMPLEMENTATION
-#include "fuzzkit.h"
+#include "texsyn.h"
 
-#include <stdio.h>
+#include "fuzzkit.h"
 
 enum { MOST_SIDE = 80, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = 16 };
 

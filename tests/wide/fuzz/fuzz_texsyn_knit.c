@@ -7,9 +7,9 @@
    The bytes choose sizes, channels, depth, strides, kind of layout, zone, roughness, example of a border
    and which allocation fails. Nothing may be written after an error, nor between the rows.       */
 #define TEXSYN_IMPLEMENTATION
-#include "fuzzkit.h"
+#include "texsyn.h"
 
-#include <stdio.h>
+#include "fuzzkit.h"
 
 enum { MOST_SIDE = 72, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = 24 };
 

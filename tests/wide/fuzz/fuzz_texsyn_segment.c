@@ -8,9 +8,9 @@
    allocation fails. Each label must be there, by area, and nothing else; nothing is written after an
    error or beside the rows.                                                                     */
 #define TEXSYN_IMPLEMENTATION
-#include "fuzzkit.h"
+#include "texsyn.h"
 
-#include <stdio.h>
+#include "fuzzkit.h"
 
 enum { MOST_SIDE = 200, USED = 32, PAD = 3, FILL = 0x5c };
 

@@ -8,9 +8,9 @@
    What is refused must have a message and leave the output alone. What is eroded at one level must be
    part of the next; grays must stay gray.                                                       */
 #define TEXSYN_IMPLEMENTATION
-#include "fuzzkit.h"
+#include "texsyn.h"
 
-#include <stdio.h>
+#include "fuzzkit.h"
 
 static long accepted; /* calls so far */
 
