@@ -34,7 +34,7 @@ static int even_example(cli *run, int even, texsyn_learn_desc *d) {
 
 static const cli_manual learn_manual = {
     "learn", "EXEMPLAR -o MODEL.txs [options]", "learn a small model of a texture from a picture",
-    "EXEMPLAR is a PNG, JPEG, BMP, TGA or binary PNM picture of the texture, at least\n"
+    "EXEMPLAR is a PNG, JPEG, TIFF, WebP, BMP, TGA or PNM picture of the texture, at least\n"
     "16 x 16 pixels, gray, RGB or RGBA (gray with alpha is read as RGBA). About 256 x 256\n"
     "pixels that show the largest element a few dozen times are enough. The model holds\n"
     "statistics, no pixels; 'texkit synth' makes new texture from it. If the light falls off to\n"
@@ -115,8 +115,9 @@ static const cli_manual synth_manual = {
     "synth", "EXEMPLAR|MODEL.txs -o OUT --size WxH [options]",
     "make new texture from a model or a picture",
     "The input is a model of 'texkit learn' or a picture, from which a model is learned\n"
-    "first (the file's content decides, not its name). OUT ends in .png, .tga, .bmp or\n"
-    ".jpg; it has the channels of the exemplar. JPEG and BMP store gray as RGB; JPEG has no alpha. A\n"
+    "first (the file's content decides, not its name). OUT ends in .png, .jpg, .tif,\n"
+    ".webp, .tga or .bmp; it has the channels of the exemplar. BMP and WebP store gray as RGB; JPEG\n"
+    "has no alpha. A\n"
     "higher --quality makes more sweeps over the picture: its statistics get closer to the\n"
     "exemplar's, and it takes longer. Uneven light of a picture is evened out before it is\n"
     "learned, as by 'texkit learn'.\n",

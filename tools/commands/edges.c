@@ -12,8 +12,8 @@ static const cli_manual edges_manual = {
     "find the boundaries between the gray layers of a picture",
     "The grays of EXEMPLAR are divided into layers of about equal area; layer 0 is the\n"
     "darkest. The strokes of 'texkit patch --control' refer to these layers. OUT ends in\n"
-    ".png, .tga, .bmp or .jpg  the boundaries of every layer on its own side, one pixel wide,\n"
-    "                          darker for darker layers;\n"
+    ".png, .jpg, .tif, .webp, .tga or .bmp  the boundaries of every layer on its own side, one\n"
+    "       pixel wide, darker for darker layers;\n"
     ".svg   one path for each layer, filled with its gray: the layers as shapes;\n"
     ".json  {\"width\", \"height\", \"levels\", \"thresholds\": [...],\n"
     "        \"lines\": [{\"layer\": 0, \"hole\": false, \"points\": [[x,y], ...]}, ...]}\n"

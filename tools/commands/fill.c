@@ -16,7 +16,7 @@ static const cli_manual fill_manual = {
     "grass, bark, sand, litter. Lines and shapes that end at the region are not continued; that\n"
     "is what 'texkit inpaint' is for. The region may have any shape and several parts. OUT ends "
     "in\n"
-    ".png, .tga, .bmp or .jpg and has the channels of IMAGE; .png keeps 16 bits.\n"
+    ".png, .jpg, .tif, .webp, .tga or .bmp and has the channels of IMAGE; .png and .tif keep 16 bits.\n"
     "--source S learns only where S is white, of what lies near the region.\n"
     "--model fills with a texture of 'texkit learn', whose exemplar had the channels of IMAGE;\n"
     "--relight gives it the mean colour and the contrast of the picture.\n"

@@ -11,8 +11,9 @@ static const cli_manual inpaint_manual = {
     "complete what is missing in a picture or in the texture of a mesh",
     "What is white in M is missing. Lines that end at a hole are continued through it; along\n"
     "them, and then everywhere else, it is filled with pieces of its surroundings. No other\n"
-    "pixel changes, but for the gutters of holes. OUT ends in .png, .tga, .bmp or .jpg and has\n"
-    "the channels of the picture; .png keeps 16 bits. Pictures and masks have the same size.\n"
+    "pixel changes, but for the gutters of holes. OUT ends in .png, .jpg, .tif,\n"
+    ".webp, .tga or .bmp and has the channels of the picture; .png and .tif keep 16 bits.\n"
+    "Pictures and masks have the same size.\n"
     "--mesh completes on the surface of MESH, an OBJ or PLY file with texture coordinates, across\n"
     "  the seams of its texture; vertices at equal positions count as one.\n"
     "--maps M1,M2 are pictures in register, completed from the same pieces. Each is named after\n"

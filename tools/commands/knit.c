@@ -12,8 +12,8 @@ static const cli_manual knit_manual = {
     "size of A; B is reflected where it ends. Between pictures of the same texture the zone of the\n"
     "border is made anew. Between different ones the border is first displaced as their grain\n"
     "suggests. An example of the border says what happens there. Everywhere else OUT has the samples\n"
-    "of A or B. OUT ends in .png, .tga, .bmp or .jpg; it has the channels of A and B, and .png keeps\n"
-    "16 bits.\n",
+    "of A or B. OUT ends in .png, .jpg, .tif, .webp, .tga or .bmp; it has the channels of A and B,\n"
+    "and .png and .tif keep 16 bits.\n",
     "  texkit knit rock.png grass.png --layout slope.png -o hill.png\n"
     "  texkit knit a.png b.png --layout l.png --border ab.png --border-layout ab-l.png -o c.png\n",
     2, "two pictures", 0, "take smaller pictures", NULL};

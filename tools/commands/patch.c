@@ -15,7 +15,8 @@ static const cli_manual patch_manual = {
     "make new texture out of pieces of a picture, in register for all maps",
     "For textures whose structure must continue: bricks, weaves, cobbles, planks, stones.\n"
     "EXEMPLAR is a picture of 32 x 32 pixels or more; a lattice in it is found and kept. OUT\n"
-    "ends in .png, .tga, .bmp or .jpg and has the channels of EXEMPLAR; .png keeps 16 bits.\n"
+    "ends in .png, .jpg, .tif, .webp, .tga or .bmp and has the channels of EXEMPLAR; .png and .tif\n"
+    "keep 16 bits.\n"
     "--maps M1,M2 are pictures in register with EXEMPLAR. Each is made in register with OUT\n"
     "  and named after the part of its name that EXEMPLAR's lacks: bricks-normal.png becomes\n"
     "  OUT-normal.png. Options count maps from 0, which is EXEMPLAR.\n"

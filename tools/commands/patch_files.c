@@ -65,6 +65,7 @@ static int read_exemplar(patch_job *j, int e) {
     texpatch_exemplar *x = &j->exemplars[e];
     const char *path = j->exemplar_names.at[e];
     int status = CLI_DONE;
+    j->run.max_side = TEXPATCH_MAX_SIDE;
     x->maps = j->pictures[e];
     for (int m = 0; m < j->desc.map_count && !status; m++) {
         const txm_image *first = &j->pictures[0][m];
@@ -76,6 +77,7 @@ static int read_exemplar(patch_job *j, int e) {
             status = check_extent(&j->run, "the map", name, image, x->maps[0].width, x->maps[0].height,
                                   path);
     }
+    j->run.max_side = 0;
     return status;
 }
 

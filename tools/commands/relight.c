@@ -11,8 +11,9 @@ static const cli_manual relight_manual = {
     "give a picture the light of another one",
     "Corrects exposure, contrast, gamma, saturation and the colour of the light, so that materials\n"
     "of IMAGE look as in TARGET, which may have any size and show them in other shares. Grays stay\n"
-    "exactly gray. OUT ends in .png, .tga, .bmp or .jpg; it has the channels of IMAGE, and .png keeps\n"
-    "16 bits. In masks white counts, gray times alpha of at least half. 'gain' of --stats is by how\n"
+    "exactly gray. OUT ends in .png, .jpg, .tif, .webp, .tga or .bmp; it has the channels of IMAGE,\n"
+    "and .png and .tif keep 16 bits. In masks white counts, gray times alpha of at least half.\n"
+    "'gain' of --stats is by how\n"
     "much the saturation changes, 'cast' what the colour of the light adds to it.\n",
     "  texkit relight forest.jpg --like slope.jpg -o overcast.png\n"
     "  texkit relight a.png --like b.png --mask a-stone.png --like-mask b-stone.png -o c.png\n",
