@@ -253,6 +253,57 @@ TEXPATCH_API void texpatch_free(texpatch_job *job);
 /* The lattice that a job keeps: x, y of both steps in pixels of the exemplar; 0: it has none. */
 TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 
+/* ---- straightening a photograph ---------------------------------------------------------- */
+
+/* A wall or floor that was photographed at an angle, turned, or through a lens that bends lines, as
+   it looks from straight in front. Its pattern must repeat in one direction at least: masonry, tiles,
+   planks, roofs, cloth. */
+typedef struct texpatch_straight_desc {
+    txm_image photo; /* the pattern is looked for in it; not modified, need not live on             */
+    txm_image mask;  /* TXM_U8, 1 channel, the size of photo: under 128 = do not look here; pixels
+                        NULL: look everywhere. Transparent pixels are not looked at either          */
+    float focal;     /* focal length of the camera, in longer sides of the photograph as it was
+                        taken, 0.1..100 (that for 35 mm film over 36); 0 = 0.85. It only
+                        matters for the proportions of what was photographed from the side          */
+} texpatch_straight_desc;
+
+typedef struct texpatch_straight texpatch_straight;
+
+/* Find the pattern of a photograph, and how it was photographed.
+
+   out    receives the result, or NULL on any error; release it with texpatch_straight_free
+   return TXM_OK, also if there is no pattern; TXM_BAD_ARGUMENT, TXM_TOO_LARGE,
+          TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost   some 0.1 to 0.5 s; some 30 bytes per pixel of a picture of at most 2600 x 2600        */
+TEXPATCH_API txm_status texpatch_straight_find(const texpatch_straight_desc *desc, txm_env *env,
+                                               texpatch_straight **out);
+
+/* 1: a pattern was found; width, height (NULL is allowed) receive the size of the straight picture.
+   0: there is none, or straight is NULL; the size is that of the photograph. The straight picture
+   is the upright rectangle that shows most of the photograph and nothing beyond it, as fine as the
+   photograph is anywhere in it, but of at most twice its pixels. */
+TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int *width,
+                                         int *height);
+
+/* Draw a picture in register with the photograph, straight; without a pattern: a copy.
+
+   image  the size of the photograph: it itself, or another map of the same material
+   map    what kind of map it is (its weight is ignored); NULL = colours. Normals turn with the
+          picture, labels are never blended; colours are weighted by their alpha unless is_data
+   out    of the size that was found, with the channels and samples of image
+   return TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
+TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight,
+                                               const txm_image *image, const texpatch_map *map,
+                                               txm_env *env, const txm_image *out);
+
+/* Where pixel (x, y) of the straight picture lies in the photograph, in pixels whose centres are
+   whole numbers. 0: nowhere, or an argument is NULL or not finite. */
+TEXPATCH_API int texpatch_straight_source(const texpatch_straight *straight, double x, double y,
+                                          double source[2]);
+
+/* Release a result; NULL is allowed. */
+TEXPATCH_API void texpatch_straight_free(texpatch_straight *straight);
+
 /* ---- levels of detail -------------------------------------------------------------------- */
 
 /* The next coarser level of a finished map, max(1, width / 2) x max(1, height / 2) pixels, rounded
@@ -318,6 +369,13 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 #include "texpatch/again.h"
 #include "texpatch/plane.h"
 #include "texpatch/levels.h"
+#include "texpatch/evened.h"
+#include "texpatch/spectra.h"
+#include "texpatch/view.h"
+#include "texpatch/phase.h"
+#include "texpatch/sighting.h"
+#include "texpatch/frame.h"
+#include "texpatch/rectify.h"
 #endif /* TEXPATCH_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------
