@@ -45,6 +45,8 @@
      texpatch_begin ...   the same in steps, with a picture after each; texpatch_again synthesises
                           a part again, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
+     texpatch_straight_   a photograph of a wall or floor, seen at an angle, as from straight in
+                          front; what is synthesised from it keeps its courses
      texpatch_half        coarser levels of detail of a result
      texsyn.h makes stochastic texture from a model of a few kB instead of pieces of the photograph;
      textiles.h makes sets of tiles that are assembled when the picture is drawn.
@@ -65,12 +67,15 @@
      Alpha, the last of 2 or 4 channels of a map that is neither data nor normals, says how much of
      a pixel shows: colours are compared, averaged and bent weighted by it, and the colours of fully
      transparent pixels never matter; those of the result are the visible neighbours'.
+     A photograph is straightened before all that: the spectra of small windows are those of a few
+     waves on a plane; the tilt, the lens and the waves that explain all windows are searched for and
+     then fitted to the phases of the waves by least squares. Edges tell which way is up.
      A part that is synthesised again and a cell of the plane are the same kind of job, with some
      pixels given.
 
    LIMITS
-     Touching stones are sometimes merged; perspective is not corrected; a lattice whose rows are
-     not parallel (waves, fans) is not found. What is unique in the exemplar, such as a knot in
+     Touching stones are sometimes merged; perspective is corrected by
+     texpatch_straight_find alone; a lattice whose rows are not parallel (waves, fans) is not found. What is unique in the exemplar, such as a knot in
      wood, is repeated.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
@@ -252,6 +257,60 @@ TEXPATCH_API void texpatch_free(texpatch_job *job);
 
 /* The lattice that a job keeps: x, y of both steps in pixels of the exemplar; 0: it has none. */
 TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
+
+/* ---- straightening a photograph ---------------------------------------------------------- */
+
+/* A wall or floor that was photographed at an angle, turned, or through a lens that bends lines, as
+   it looks from straight in front. Its pattern must repeat in one direction at least: masonry, tiles,
+   planks, roofs, cloth. */
+typedef struct texpatch_straight_desc {
+    txm_image photo; /* the pattern is looked for in it; not modified, need not live on             */
+    txm_image mask;  /* TXM_U8, 1 channel, the size of photo: under 128 = do not look here; pixels
+                        NULL: look everywhere. Transparent pixels are not looked at either          */
+    float focal;     /* focal length of the camera, in longer sides of the photograph as it was
+                        taken, 0.1..100 (that for 35 mm film over 36); 0 = 0.85. It only
+                        matters for the proportions of what was photographed from the side          */
+} texpatch_straight_desc;
+
+typedef struct texpatch_straight texpatch_straight;
+
+/* Find the pattern of a photograph, and how it was photographed.
+
+   out    receives the result, or NULL on any error; release it with texpatch_straight_free
+   return TXM_OK, also if there is no pattern; TXM_BAD_ARGUMENT, TXM_TOO_LARGE,
+          TXM_OUT_OF_MEMORY, TXM_CANCELLED
+   cost   some 0.1 to 0.5 s; some 30 bytes per pixel of a picture of at most 2600 x 2600        */
+TEXPATCH_API txm_status texpatch_straight_find(const texpatch_straight_desc *desc, txm_env *env,
+                                               texpatch_straight **out);
+
+/* 1: a pattern was found; width, height (NULL is allowed) receive the size of the straight picture.
+   0: there is none, or straight is NULL; the size is that of the photograph. The straight picture
+   is the upright rectangle that shows most of the photograph and nothing beyond it, as fine as the
+   photograph is anywhere in it, but of at most twice its pixels. */
+TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int *width,
+                                         int *height);
+
+/* How well the pattern agrees with a plane, 0 to 1; 0 if there is none or straight is NULL. */
+TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straight);
+
+/* Draw a picture in register with the photograph, straight; without a pattern: a copy.
+
+   image  the size of the photograph: it itself, or another map of the same material
+   map    what kind of map it is (its weight is ignored); NULL = colours. Normals turn with the
+          picture, labels are never blended; colours are weighted by their alpha unless is_data
+   out    of the size that was found, with the channels and samples of image
+   return TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
+TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight,
+                                               const txm_image *image, const texpatch_map *map,
+                                               txm_env *env, const txm_image *out);
+
+/* Where pixel (x, y) of the straight picture lies in the photograph, in pixels whose centres are
+   whole numbers. 0: nowhere, or an argument is NULL or not finite. */
+TEXPATCH_API int texpatch_straight_source(const texpatch_straight *straight, double x, double y,
+                                          double source[2]);
+
+/* Release a result; NULL is allowed. */
+TEXPATCH_API void texpatch_straight_free(texpatch_straight *straight);
 
 /* ---- levels of detail -------------------------------------------------------------------- */
 
@@ -4117,6 +4176,1729 @@ TEXPATCH_API txm_status texpatch_half(const txm_image *image, const texpatch_map
     else if (map && map->is_normal) content = TXM_NORMALS;
     else if (map && map->is_data) content = TXM_DATA;
     return txm_image_halve(image, content, tileable, half, env);
+}
+
+/* ---- evened pictures ----------------------------------------------------------------------- */
+
+/* In uneven light the slow part of a photograph is louder than its pattern. A pattern is looked for
+   in gray pictures of which at each place the mean of the surroundings is 0 and the deviation 1. */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_FINEST = 2600,  /* pixels of the longer side of the largest picture that is searched */
+    TXP_COARSEST = 200, /* the same of the smallest one                                      */
+    TXP_SIZES = 5,      /* pictures, each half as large as the one before, at most           */
+    TXP_EVEN_PART = 8,  /* surroundings reach this part of the longer side ...               */
+    TXP_EVEN_MOST = 64  /* ... but not more pixels than this                                 */
+};
+#define TXP_EVEN_FAINT 0.3 /* of the mean deviation: fainter surroundings are not raised further  */
+
+/* A gray picture. */
+typedef struct txp_gray {
+    int width, height;
+    float *at;    /* evened: 0 where nothing is known                          */
+    float *known; /* 0..1: how much of the pixel is visible and not masked     */
+} txp_gray;
+
+/* How a photograph is reduced to its first gray picture. */
+typedef struct txp_graying {
+    const txm_image *image, *mask; /* mask without pixels: none */
+    txp_gray *gray;
+    int shrink; /* blocks of shrink x shrink pixels become one */
+} txp_graying;
+
+/* How much a pixel counts, 0..1. */
+static inline double txp_visible(const txm_image *im, const txm_image *mask, int x, int y) {
+    if (mask->pixels && ((const uint8_t *)txm_image_row_const(mask, y))[x] < 128) return 0;
+    if (im->channels == 2 || im->channels == 4)
+        return (double)txm_clampf(txm_image_get(im, x, y, im->channels - 1), 0, 1);
+    return 1;
+}
+
+static void txp_gray_row(void *context, int row) {
+    const txp_graying *g = (const txp_graying *)context;
+    const txm_image *im = g->image;
+    const int colours = im->channels < 3 ? 1 : 3, n = g->shrink;
+    for (int column = 0; column < g->gray->width; column++) {
+        double sum = 0, known = 0;
+        int count = 0;
+        for (int y = row * n; y < row * n + n && y < im->height; y++) {
+            for (int x = column * n; x < column * n + n && x < im->width; x++, count++) {
+                const double weight = txp_visible(im, g->mask, x, y);
+                double value = 0;
+                for (int c = 0; c < colours; c++) value += (double)txm_image_get(im, x, y, c);
+                sum += weight * value;
+                known += weight;
+            }
+        }
+        const size_t at = (size_t)row * (size_t)g->gray->width + (size_t)column;
+        g->gray->at[at] = known > 0 ? txm_float(sum / known) : 0;
+        g->gray->known[at] = txm_float(known / count);
+    }
+}
+
+static int txp_gray_new(txp_gray *g, int width, int height, txm_arena *arena) {
+    const size_t count = (size_t)width * (size_t)height;
+    g->width = width;
+    g->height = height;
+    g->at = (float *)txm_arena_alloc(arena, count, sizeof *g->at);
+    g->known = (float *)txm_arena_alloc(arena, count, sizeof *g->known);
+    return !arena->failed;
+}
+
+/* The next smaller picture; to: (width + 1) / 2 x (height + 1) / 2. */
+static void txp_gray_halve(const txp_gray *from, txp_gray *to) {
+    for (int y = 0; y < to->height; y++) {
+        for (int x = 0; x < to->width; x++) {
+            double sum = 0, known = 0;
+            int count = 0;
+            for (int v = 2 * y; v < 2 * y + 2 && v < from->height; v++) {
+                for (int u = 2 * x; u < 2 * x + 2 && u < from->width; u++, count++) {
+                    const size_t at = (size_t)v * (size_t)from->width + (size_t)u;
+                    sum += (double)from->known[at] * (double)from->at[at];
+                    known += (double)from->known[at];
+                }
+            }
+            const size_t at = (size_t)y * (size_t)to->width + (size_t)x;
+            to->at[at] = known > 0 ? txm_float(sum / known) : 0;
+            to->known[at] = txm_float(known / count);
+        }
+    }
+}
+
+/* ---- means of surroundings ----------------------------------------------------------------- */
+
+/* Sums over (2 reach + 1) x (2 reach + 1) pixels, cut off at the border, in place; sums: room for
+   width numbers, copy: for width * height. */
+static void txp_box_sums(float *at, int width, int height, int reach, double *sums, float *copy) {
+    const size_t w = (size_t)width;
+    for (int y = 0; y < height; y++) {
+        const float *row = at + (size_t)y * w;
+        double sum = 0;
+        for (int x = 0; x < reach && x < width; x++) sum += (double)row[x];
+        for (int x = 0; x < width; x++) {
+            if (x + reach < width) sum += (double)row[x + reach];
+            if (x - reach - 1 >= 0) sum -= (double)row[x - reach - 1];
+            copy[(size_t)y * w + (size_t)x] = txm_float(sum);
+        }
+    }
+    for (size_t x = 0; x < w; x++) sums[x] = 0;
+    for (int y = 0; y < reach && y < height; y++)
+        for (size_t x = 0; x < w; x++) sums[x] += (double)copy[(size_t)y * w + x];
+    for (int y = 0; y < height; y++) {
+        if (y + reach < height)
+            for (size_t x = 0; x < w; x++) sums[x] += (double)copy[(size_t)(y + reach) * w + x];
+        if (y - reach - 1 >= 0)
+            for (size_t x = 0; x < w; x++) sums[x] -= (double)copy[(size_t)(y - reach - 1) * w + x];
+        for (size_t x = 0; x < w; x++) at[(size_t)y * w + x] = txm_float(sums[x]);
+    }
+}
+
+/* An evened copy of a gray picture: means over 2 reach + 1 pixels taken out. 0: no memory. */
+static int txp_even(const txp_gray *from, int reach, txm_arena *arena, txm_env *env, txp_gray *to) {
+    const size_t count = (size_t)from->width * (size_t)from->height;
+    txm_arena scratch;
+    txm_arena_init(&scratch, env);
+    float *copy = (float *)txm_arena_alloc(&scratch, count, sizeof *copy);
+    float *weight = (float *)txm_arena_alloc(&scratch, count, sizeof *weight);
+    float *square = (float *)txm_arena_alloc(&scratch, count, sizeof *square);
+    double *sums = (double *)txm_arena_alloc(&scratch, (size_t)from->width, sizeof *sums);
+    if (!txp_gray_new(to, from->width, from->height, arena) || scratch.failed) {
+        txm_arena_free(&scratch);
+        return 0;
+    }
+    memcpy(to->known, from->known, count * sizeof *to->known);
+    memcpy(weight, from->known, count * sizeof *weight);
+    for (size_t i = 0; i < count; i++) to->at[i] = from->at[i] * from->known[i];
+    txp_box_sums(weight, from->width, from->height, reach, sums, copy);
+    txp_box_sums(to->at, from->width, from->height, reach, sums, copy);
+    double all = 0, seen = 0;
+    for (size_t i = 0; i < count; i++) {
+        const double mean = weight[i] > 1e-3f ? (double)to->at[i] / (double)weight[i] : 0;
+        to->at[i] = txm_float((double)from->known[i] * ((double)from->at[i] - mean));
+        square[i] = txm_float((double)to->at[i] * (double)to->at[i]);
+        all += (double)square[i];
+        seen += (double)from->known[i];
+    }
+    txp_box_sums(square, from->width, from->height, reach, sums, copy);
+    const double faint = seen > 0 ? TXP_EVEN_FAINT * sqrt(all / seen) : 0;
+    for (size_t i = 0; i < count; i++) {
+        const double mean = weight[i] > 1e-3f ? (double)square[i] / (double)weight[i] : 0;
+        const double deviation = sqrt(mean > 0 ? mean : 0) + faint;
+        to->at[i] = deviation > 0 ? txm_float((double)to->at[i] / deviation) : 0;
+    }
+    txm_arena_free(&scratch);
+    return 1;
+}
+
+/* The evened pictures of a photograph, largest first. Returns their number; 0: no memory. */
+static int txp_evened_sizes(const txm_image *image, const txm_image *mask, txm_arena *arena,
+                            txm_env *env, txp_gray *sizes) {
+    txp_graying g;
+    txp_gray gray[TXP_SIZES];
+    txm_arena scratch;
+    const int longer = image->width > image->height ? image->width : image->height;
+    int count = 0;
+    txm_arena_init(&scratch, env);
+    g.image = image;
+    g.mask = mask;
+    g.gray = &gray[0];
+    g.shrink = (longer + TXP_FINEST - 1) / TXP_FINEST;
+    int w = (image->width + g.shrink - 1) / g.shrink, h = (image->height + g.shrink - 1) / g.shrink;
+    while (count < TXP_SIZES && (!count || (w > h ? w : h) >= TXP_COARSEST)) {
+        if (!txp_gray_new(&gray[count], w, h, &scratch)) break;
+        if (count) txp_gray_halve(&gray[count - 1], &gray[count]);
+        else txm_parallel_for(env, h, txp_gray_row, &g);
+        const int reach = (w > h ? w : h) / TXP_EVEN_PART;
+        if (!txp_even(&gray[count], txm_clampi(reach, 4, TXP_EVEN_MOST), arena, env, &sizes[count]))
+            break;
+        count++;
+        w = (w + 1) / 2;
+        h = (h + 1) / 2;
+    }
+    if (scratch.failed || arena->failed) count = 0;
+    txm_arena_free(&scratch);
+    return count;
+}
+
+/* ---- local spectra of a photograph -------------------------------------------------------- */
+
+/* A photographed lattice has, seen through a small window, a spectrum of a few peaks, whose places
+   change slowly from window to window. What this part makes of a photograph: gray pictures of
+   several sizes, evened, and of each the spectra of windows spread over it. */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_WINDOWS = 9,      /* windows side by side, at most; half of each lies in the next one     */
+    TXP_WINDOW_SIDE = 128, /* pixels; 64 where the picture is smaller                             */
+    TXP_TIPS = 6          /* peaks of a spectrum that are looked at                               */
+};
+#define TXP_WEAK 0.1        /* of the strongest frequency: weaker ones are not raised further     */
+#define TXP_LEAST_WAVES 2.5 /* in a window: the lowest frequency that is looked at                */
+
+/* A place in a photograph: pixels from its middle, in halves of its longer side. */
+typedef struct txp_spot {
+    double x, y;
+} txp_spot;
+
+/* The spectra of the windows of one gray picture, as magnitudes over the mean of their frequency:
+   side x (side / 2 + 1) of each, kx from -side / 2, ky from 0. */
+typedef struct txp_spectra {
+    const txp_gray *gray;
+    int side, across, down;
+    double half;       /* half of the longer side of the gray picture, in its pixels              */
+    float *at;         /* across * down spectra                                                   */
+    txp_spot *middles; /* of the windows                                                          */
+    double (*tips)[TXP_TIPS][2]; /* the highest peaks: cycles per half side; 0, 0: none           */
+} txp_spectra;
+
+static inline size_t txp_spectrum_size(int side) {
+    return (size_t)side * (size_t)(side / 2 + 1);
+}
+
+/* ---- the Fourier transform ----------------------------------------------------------------- */
+
+typedef struct txp_complex {
+    double re, im;
+} txp_complex;
+
+/* In place, count a power of two; turns: the first half of the unit circle, clockwise; step: from
+   one value to the next. */
+static void txp_fourier(txp_complex *v, int count, int step, const txp_complex *turns) {
+    for (int i = 1, j = 0; i < count; i++) {
+        int bit = count / 2;
+        for (; j & bit; bit /= 2) j ^= bit;
+        j ^= bit;
+        if (i < j) {
+            const txp_complex t = v[i * step];
+            v[i * step] = v[j * step];
+            v[j * step] = t;
+        }
+    }
+    for (int size = 2; size <= count; size *= 2) {
+        for (int first = 0; first < count; first += size) {
+            for (int k = 0; k < size / 2; k++) {
+                const txp_complex w = turns[k * (count / size)];
+                txp_complex *a = v + (first + k) * step, *b = v + (first + k + size / 2) * step;
+                const double re = b->re * w.re - b->im * w.im, im = b->re * w.im + b->im * w.re;
+                b->re = a->re - re;
+                b->im = a->im - im;
+                a->re += re;
+                a->im += im;
+            }
+        }
+    }
+}
+
+/* What the windows of a picture need, prepared once. */
+typedef struct txp_spectra_work {
+    txp_spectra *spectra;
+    txp_complex turns[TXP_WINDOW_SIDE / 2];
+    double bell[TXP_WINDOW_SIDE]; /* Hann's window                                               */
+    txp_complex *room;            /* side * side for each pair of windows                        */
+} txp_spectra_work;
+
+/* The first pixel of window i of count over length pixels. */
+static int txp_window_start(int length, int side, int count, int i) {
+    return count > 1 ? (int)((int64_t)(length - side) * i / (count - 1)) : (length - side) / 2;
+}
+
+/* Two windows at once: one is the real part, the other the imaginary one. */
+static void txp_window_pair(void *context, int pair) {
+    txp_spectra_work *w = (txp_spectra_work *)context;
+    txp_spectra *s = w->spectra;
+    const int n = s->side, count = s->across * s->down;
+    txp_complex *v = w->room + (size_t)pair * (size_t)n * (size_t)n;
+    memset(v, 0, (size_t)n * (size_t)n * sizeof *v);
+    for (int part = 0; part < 2 && 2 * pair + part < count; part++) {
+        const int i = 2 * pair + part;
+        const int x0 = txp_window_start(s->gray->width, n, s->across, i % s->across);
+        const int y0 = txp_window_start(s->gray->height, n, s->down, i / s->across);
+        s->middles[i].x = (x0 + 0.5 * n - 0.5 * s->gray->width) / s->half;
+        s->middles[i].y = (y0 + 0.5 * n - 0.5 * s->gray->height) / s->half;
+        for (int y = 0; y < n; y++) {
+            const float *row = s->gray->at + (size_t)(y0 + y) * (size_t)s->gray->width + x0;
+            for (int x = 0; x < n; x++) {
+                const double value = (double)row[x] * w->bell[x] * w->bell[y];
+                if (part) v[y * n + x].im = value;
+                else v[y * n + x].re = value;
+            }
+        }
+    }
+    for (int y = 0; y < n; y++) txp_fourier(v + y * n, n, 1, w->turns);
+    for (int x = 0; x < n; x++) txp_fourier(v + x, n, n, w->turns);
+    for (int part = 0; part < 2 && 2 * pair + part < count; part++) {
+        float *to = s->at + (size_t)(2 * pair + part) * txp_spectrum_size(n);
+        for (int ky = 0; ky <= n / 2; ky++) {
+            for (int kx = -n / 2; kx < n / 2; kx++) {
+                const txp_complex a = v[(ky & (n - 1)) * n + (kx & (n - 1))];
+                const txp_complex b = v[(-ky & (n - 1)) * n + (-kx & (n - 1))];
+                const double re = part ? a.im + b.im : a.re + b.re;
+                const double im = part ? b.re - a.re : a.im - b.im;
+                to[ky * n + kx + n / 2] = txm_float(0.5 * sqrt(re * re + im * im));
+            }
+        }
+    }
+}
+
+/* Divide all spectra by the mean of their frequency over all windows, so that noise of every colour
+   is about 1 where there is much of it. */
+static void txp_whiten(txp_spectra *s) {
+    double mean[TXP_WINDOW_SIDE] = {0}, most = 0;
+    int64_t count[TXP_WINDOW_SIDE] = {0};
+    const int n = s->side, windows = s->across * s->down;
+    for (int pass = 0; pass < 2; pass++) {
+        float *at = s->at;
+        for (int i = 0; i < windows; i++) {
+            for (int ky = 0; ky <= n / 2; ky++) {
+                for (int kx = -n / 2; kx < n / 2; kx++, at++) {
+                    const int r = (int)(sqrt((double)(kx * kx + ky * ky)) + 0.5);
+                    if (pass) {
+                        *at = r && most > 0 ? txm_float((double)*at / mean[r]) : 0;
+                    } else {
+                        mean[r] += (double)*at;
+                        count[r]++;
+                    }
+                }
+            }
+        }
+        for (int r = 1; r < n && !pass; r++) {
+            if (count[r]) mean[r] /= (double)count[r];
+            most = fmax(most, mean[r]);
+        }
+        for (int r = 1; r < n && !pass; r++) mean[r] += TXP_WEAK * most;
+    }
+}
+
+/* Magnitude of window i at a frequency in cycles per half side; 0 beyond what it can show. */
+static inline double txp_spectrum_at(const txp_spectra *s, int i, double wx, double wy) {
+    const int n = s->side;
+    const double bins = n / s->half;
+    double kx = wx * bins, ky = wy * bins;
+    if (ky < 0) {
+        kx = -kx;
+        ky = -ky;
+    }
+    kx += 0.5 * n;
+    if (!(kx >= 0 && kx < n - 1.001 && ky < 0.5 * n - 0.001)) return 0;
+    const int x = (int)kx, y = (int)ky;
+    const double u = kx - x, v = ky - y;
+    const float *p = s->at + (size_t)i * txp_spectrum_size(n) + y * n + x;
+    return ((double)p[0] * (1 - u) + (double)p[1] * u) * (1 - v) +
+           ((double)p[n] * (1 - u) + (double)p[n + 1] * u) * v;
+}
+
+/* The highest peaks of a window. */
+static void txp_find_tips(void *context, int i) {
+    txp_spectra *s = ((txp_spectra_work *)context)->spectra;
+    const int n = s->side;
+    const float *at = s->at + (size_t)i * txp_spectrum_size(n);
+    double height[TXP_TIPS] = {0};
+    memset(s->tips[i], 0, sizeof s->tips[i]);
+    for (int ky = 0; ky < n / 2; ky++) {
+        for (int kx = 1 - n / 2; kx < n / 2 - 1; kx++) {
+            const float *p = at + ky * n + kx + n / 2;
+            if (kx * kx + ky * ky < TXP_LEAST_WAVES * TXP_LEAST_WAVES || (ky == 0 && kx < 0)) continue;
+            if (!((double)*p > height[TXP_TIPS - 1]) || p[-1] > *p || p[1] >= *p) continue;
+            if (p[n] >= *p || (ky > 0 && p[-n] > *p)) continue;
+            int k = TXP_TIPS - 1;
+            for (; k > 0 && height[k - 1] < (double)*p; k--) {
+                height[k] = height[k - 1];
+                memcpy(s->tips[i][k], s->tips[i][k - 1], sizeof s->tips[i][k]);
+            }
+            const double l = (double)p[-1], r = (double)p[1], c = (double)*p;
+            const double d = (double)p[n], t = ky > 0 ? (double)p[-n] : d;
+            height[k] = c;
+            s->tips[i][k][0] = (kx + 0.5 * (l - r) / (l + r - 2 * c)) * s->half / n;
+            s->tips[i][k][1] = (ky + (t + d < 2 * c ? 0.5 * (t - d) / (t + d - 2 * c) : 0)) * s->half / n;
+        }
+    }
+}
+
+/* The spectra of all windows of a gray picture. 0: no memory. */
+static int txp_spectra_make(const txp_gray *gray, int side, txm_arena *arena, txm_env *env,
+                            txp_spectra *s) {
+    txp_spectra_work w;
+    txm_arena scratch;
+    const int step = side / 2;
+    memset(s, 0, sizeof *s);
+    s->gray = gray;
+    s->side = side;
+    s->half = 0.5 * (gray->width > gray->height ? gray->width : gray->height);
+    s->across = txm_clampi((gray->width - side + step - 1) / step + 1, 1, TXP_WINDOWS);
+    s->down = txm_clampi((gray->height - side + step - 1) / step + 1, 1, TXP_WINDOWS);
+    const size_t windows = (size_t)s->across * (size_t)s->down, pairs = (windows + 1) / 2;
+    s->at = (float *)txm_arena_alloc(arena, windows * txp_spectrum_size(side), sizeof *s->at);
+    s->middles = (txp_spot *)txm_arena_alloc(arena, windows, sizeof *s->middles);
+    s->tips = (double(*)[TXP_TIPS][2])txm_arena_alloc(arena, windows, sizeof *s->tips);
+    txm_arena_init(&scratch, env);
+    w.room = (txp_complex *)txm_arena_alloc(&scratch, pairs * (size_t)side * (size_t)side,
+                                            sizeof *w.room);
+    if (arena->failed || scratch.failed) {
+        txm_arena_free(&scratch);
+        return 0;
+    }
+    w.spectra = s;
+    for (int i = 0; i < side; i++) {
+        double sine, cosine;
+        txm_sincos(2 * TXM_PI * i / side, &sine, &cosine);
+        if (i < side / 2) {
+            w.turns[i].re = cosine;
+            w.turns[i].im = -sine;
+        }
+        txm_sincos(2 * TXM_PI * (i + 0.5) / side, &sine, &cosine);
+        w.bell[i] = 0.5 - 0.5 * cosine;
+    }
+    txm_parallel_for(env, (int)pairs, txp_window_pair, &w);
+    txm_arena_free(&scratch);
+    txp_whiten(s);
+    txm_parallel_for(env, (int)windows, txp_find_tips, &w);
+    return 1;
+}
+
+/* ---- how a plane was photographed ---------------------------------------------------------- */
+
+/* From a place (x, y) of the photograph to the plane, both centred on the middle and equal there
+   to first order: the lens is undone, q = (x, y) (1 + bend r^2 + curl r^4), then the perspective,
+   (X, Y) = q / (1 + tilt_x q_x + tilt_y q_y). A periodic wall is a sum of plane waves in (X, Y). */
+typedef struct txp_view {
+    double tilt_x, tilt_y, bend, curl;
+} txp_view;
+
+/* A wave on the plane: phase = a X + b Y + shift, in turns; clear: how well it is seen, in the
+   measure of the stage; contrast: how much of the contrast it is, 0..1. */
+typedef struct txp_wave {
+    double a, b, shift, clear, contrast;
+} txp_wave;
+
+/* The place on the plane, and the derivatives m = (dX/dx, dX/dy, dY/dx, dY/dy). 0: the place lies
+   beyond the horizon, or where the lens folds. */
+static int txp_view_place(const txp_view *v, double x, double y, double place[2], double m[4]) {
+    const double rr = x * x + y * y, lens = 1 + rr * (v->bend + rr * v->curl);
+    const double slope = 2 * v->bend + 4 * rr * v->curl; /* of the lens, by r, over r */
+    const double qx = x * lens, qy = y * lens, depth = 1 + v->tilt_x * qx + v->tilt_y * qy;
+    const double lxx = lens + slope * x * x, lxy = slope * x * y, lyy = lens + slope * y * y;
+    if (!(depth > 0.05) || !(lxx * lyy - lxy * lxy > 0.02) || !(lxx > 0)) return 0;
+    const double px = qx / depth, py = qy / depth;
+    const double xx = (1 - px * v->tilt_x) / depth, xy = -px * v->tilt_y / depth;
+    const double yx = -py * v->tilt_x / depth, yy = (1 - py * v->tilt_y) / depth;
+    place[0] = px;
+    place[1] = py;
+    m[0] = xx * lxx + xy * lxy;
+    m[1] = xx * lxy + xy * lyy;
+    m[2] = yx * lxx + yy * lxy;
+    m[3] = yx * lxy + yy * lyy;
+    return 1;
+}
+
+/* ---- the search: which view makes the spectra of all windows agree? ------------------------ */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_TILT_STEPS = 8,    /* to each side of 0                                                   */
+    TXP_BEND_STEPS = 2,    /* the same                                                            */
+    TXP_ASKED_WINDOWS = 4, /* across and down: windows whose peaks are tried as waves             */
+    TXP_ASKED_TIPS = 4,    /* of the peaks of each of them                                        */
+    TXP_GUESSES = 12,      /* of each tilt_x the best guesses are kept                            */
+    TXP_OFFERS = 4,        /* of each scale, with different waves, the phases are looked at        */
+    TXP_REFINED = 24,      /* of all guesses, the best, are refined                               */
+    TXP_MOST_WINDOWS = TXP_WINDOWS * TXP_WINDOWS
+};
+#define TXP_TILT_STEP 0.1
+#define TXP_TILT_MOST 0.85  /* |tilt_x| + |tilt_y| in the corners of the picture                  */
+#define TXP_BEND_STEP 0.09
+#define TXP_PEAK_MOST 24.0  /* the limit of what a magnitude counts, so that no window decides alone */
+#define TXP_ALIKE 0.15      /* difference of one wave, of its length                               */
+#define TXP_APART 0.34      /* least sine of the angle between two waves                          */
+
+typedef struct txp_guess {
+    txp_view view;
+    txp_wave wave[2];
+    double score;
+} txp_guess;
+
+/* A view, prepared for the windows: from (a, b) to the local frequency of each. */
+typedef struct txp_prepared {
+    double m[TXP_MOST_WINDOWS][4];
+    int good[TXP_MOST_WINDOWS];
+} txp_prepared;
+
+/* The distortion (1 + k r^2) has an inverse that begins 1 - k r^2 + 3 k^2 r^4. */
+static double txp_usual_curl(double bend) {
+    return 3 * bend * bend;
+}
+
+static void txp_prepare(const txp_spectra *s, const txp_view *v, txp_prepared *p) {
+    double place[2];
+    memset(p->good, 0, sizeof p->good);
+    for (int i = 0; i < s->across * s->down; i++)
+        p->good[i] = txp_view_place(v, s->middles[i].x, s->middles[i].y, place, p->m[i]);
+}
+
+/* How clearly all windows show a wave: the mean of the magnitudes, over those that can show it. */
+static double txp_wave_clear(const txp_spectra *s, const txp_prepared *p, double a, double b) {
+    const int count = s->across * s->down;
+    const double lowest = TXP_LEAST_WAVES * s->half / s->side;
+    double sum = 0;
+    int seen = 0;
+    for (int i = 0; i < count; i++) {
+        if (!p->good[i]) continue;
+        const double *m = p->m[i];
+        const double wx = m[0] * a + m[2] * b, wy = m[1] * a + m[3] * b;
+        if (wx * wx + wy * wy < lowest * lowest) continue;
+        const double z = txp_spectrum_at(s, i, wx, wy);
+        if (!(z > 0)) continue;
+        sum += z * TXP_PEAK_MOST / (z + TXP_PEAK_MOST);
+        seen++;
+    }
+    return 2 * seen > count ? sum / sqrt((double)count * seen) : 0;
+}
+
+/* Small: of two views that are as good the flatter one is taken. */
+static double txp_view_penalty(const txp_view *v) {
+    return 1 - 0.06 * (v->tilt_x * v->tilt_x + v->tilt_y * v->tilt_y) - 0.6 * v->bend * v->bend;
+}
+
+static double txp_guess_score(const txp_spectra *s, const txp_guess *g, int waves) {
+    txp_prepared p;
+    double sum = 0;
+    txp_prepare(s, &g->view, &p);
+    for (int k = 0; k < waves; k++) sum += txp_wave_clear(s, &p, g->wave[k].a, g->wave[k].b);
+    return sum * txp_view_penalty(&g->view);
+}
+
+/* The wave on the plane that window i sees with the frequency w. */
+static int txp_wave_from(const double m[4], const double w[2], txp_wave *wave) {
+    const double det = m[0] * m[3] - m[1] * m[2];
+    if (!(fabs(det) > 1e-6) || !(w[0] * w[0] + w[1] * w[1] > 0)) return 0;
+    wave->a = (m[3] * w[0] - m[2] * w[1]) / det;
+    wave->b = (m[0] * w[1] - m[1] * w[0]) / det;
+    return 1;
+}
+
+typedef struct txp_hunt {
+    const txp_spectra *spectra;
+    double reach_x, reach_y; /* of the picture, in half sides                                    */
+    txp_guess (*best)[TXP_GUESSES];
+} txp_hunt;
+
+/* Put a guess into a list sorted by score, unless a like one is there that is better. */
+static void txp_keep_guess(txp_guess *list, int count, const txp_guess *g) {
+    int k = count - 1;
+    if (!(g->score > list[k].score)) return;
+    for (; k > 0 && list[k - 1].score < g->score; k--) list[k] = list[k - 1];
+    list[k] = *g;
+}
+
+static int txp_asked(int count, int i) {
+    return count <= TXP_ASKED_WINDOWS ? i : i * (count - 1) / (TXP_ASKED_WINDOWS - 1);
+}
+
+/* All guesses of one view. */
+static void txp_try_view(const txp_hunt *q, const txp_view *v, txp_guess *list) {
+    const txp_spectra *s = q->spectra;
+    const int across = s->across < TXP_ASKED_WINDOWS ? s->across : TXP_ASKED_WINDOWS;
+    const int down = s->down < TXP_ASKED_WINDOWS ? s->down : TXP_ASKED_WINDOWS;
+    const double penalty = txp_view_penalty(v);
+    txp_prepared p;
+    txp_guess best;
+    memset(&best, 0, sizeof best);
+    best.view = *v;
+    txp_prepare(s, v, &p);
+    for (int i = 0; i < across * down; i++) {
+        const int at =
+            txp_asked(s->down, i / across) * s->across + txp_asked(s->across, i % across);
+        if (!p.good[at]) continue;
+        for (int t = 0; t < TXP_ASKED_TIPS; t++) {
+            txp_wave wave = {0, 0, 0, 0, 0};
+            if (!txp_wave_from(p.m[at], s->tips[at][t], &wave)) continue;
+            const double score = txp_wave_clear(s, &p, wave.a, wave.b) * penalty;
+            if (!(score > best.score)) continue;
+            best.score = score;
+            best.wave[0] = wave;
+        }
+    }
+    txp_keep_guess(list, TXP_GUESSES, &best);
+}
+
+static void txp_try_column(void *context, int column) {
+    const txp_hunt *q = (const txp_hunt *)context;
+    txp_guess *list = q->best[column];
+    txp_view v;
+    memset(list, 0, TXP_GUESSES * sizeof *list);
+    v.tilt_x = (column - TXP_TILT_STEPS) * TXP_TILT_STEP;
+    for (int row = -TXP_TILT_STEPS; row <= TXP_TILT_STEPS; row++) {
+        v.tilt_y = row * TXP_TILT_STEP;
+        if (fabs(v.tilt_x) * q->reach_x + fabs(v.tilt_y) * q->reach_y > TXP_TILT_MOST) continue;
+        for (int k = -TXP_BEND_STEPS; k <= TXP_BEND_STEPS; k++) {
+            v.bend = k * TXP_BEND_STEP;
+            v.curl = txp_usual_curl(v.bend);
+            txp_try_view(q, &v, list);
+        }
+    }
+}
+
+/* Climb to the nearest maximum: each number in turn up or down, by steps that are halved. */
+static void txp_climb(const txp_spectra *s, txp_guess *g, int waves) {
+    double step[7] = {0.05, 0.05, 0.04, 0, 0, 0, 0};
+    double *number[7] = {&g->view.tilt_x, &g->view.tilt_y, &g->view.bend, &g->wave[0].a,
+                         &g->wave[0].b,   &g->wave[1].a,   &g->wave[1].b};
+    for (int k = 3; k < 7; k++) step[k] = 0.5 * s->half / s->side;
+    g->score = txp_guess_score(s, g, waves);
+    for (int round = 0, halvings = 0; round < 60 && halvings < 6; round++) {
+        int better = 0;
+        for (int k = 0; k < 3 + 2 * waves; k++) {
+            for (int sign = -1; sign <= 1; sign += 2) {
+                const double old = *number[k];
+                *number[k] += sign * step[k];
+                g->view.curl = txp_usual_curl(g->view.bend);
+                const double score = txp_guess_score(s, g, waves);
+                if (score > g->score) {
+                    g->score = score;
+                    better = 1;
+                    break;
+                }
+                *number[k] = old;
+                g->view.curl = txp_usual_curl(g->view.bend);
+            }
+        }
+        if (better) continue;
+        halvings++;
+        for (int k = 0; k < 7; k++) step[k] *= 0.5;
+    }
+}
+
+/* The clearest wave that is not along the first one. */
+static void txp_second_wave(const txp_spectra *s, txp_guess *g) {
+    const txp_wave *first = &g->wave[0];
+    txp_prepared p;
+    txp_prepare(s, &g->view, &p);
+    memset(&g->wave[1], 0, sizeof g->wave[1]);
+    for (int i = 0; i < s->across * s->down; i++) {
+        for (int t = 0; t < TXP_TIPS && p.good[i]; t++) {
+            txp_wave w = {0, 0, 0, 0, 0};
+            if (!txp_wave_from(p.m[i], s->tips[i][t], &w)) continue;
+            const double cross = first->a * w.b - first->b * w.a;
+            if (cross * cross < TXP_APART * TXP_APART * (w.a * w.a + w.b * w.b) *
+                                    (first->a * first->a + first->b * first->b))
+                continue;
+            w.clear = txp_wave_clear(s, &p, w.a, w.b);
+            if (w.clear > g->wave[1].clear) g->wave[1] = w;
+        }
+    }
+}
+
+typedef struct txp_climbers {
+    const txp_spectra *spectra;
+    txp_guess *list;
+} txp_climbers;
+
+static void txp_climb_one(void *context, int i) {
+    const txp_climbers *c = (const txp_climbers *)context;
+    if (c->list[i].score > 0) txp_climb(c->spectra, &c->list[i], 1);
+}
+
+/* Are these two waves one wave, or nearly? */
+static int txp_same_wave(const txp_wave *p, const txp_wave *q) {
+    const double pp = p->a * p->a + p->b * p->b, qq = q->a * q->a + q->b * q->b;
+    const double sign = p->a * q->a + p->b * q->b < 0 ? -1 : 1;
+    const double a = p->a - sign * q->a, b = p->b - sign * q->b;
+    return a * a + b * b < TXP_ALIKE * TXP_ALIKE * fmin(pp, qq);
+}
+
+/* The best views and waves of one scale, the best first; score 0: none. */
+static void txp_search_view(const txp_spectra *s, txm_env *env, txp_guess out[TXP_OFFERS]) {
+    enum { COLUMNS = 2 * TXP_TILT_STEPS + 1 };
+    txp_guess best[COLUMNS][TXP_GUESSES], list[TXP_REFINED];
+    txp_hunt q;
+    txp_climbers climbers;
+    txp_prepared p;
+    q.spectra = s;
+    q.reach_x = 0.5 * s->gray->width / s->half;
+    q.reach_y = 0.5 * s->gray->height / s->half;
+    q.best = best;
+    memset(list, 0, sizeof list);
+    txm_parallel_for(env, COLUMNS, txp_try_column, &q);
+    for (int i = 0; i < COLUMNS * TXP_GUESSES; i++)
+        txp_keep_guess(list, TXP_REFINED, &best[i / TXP_GUESSES][i % TXP_GUESSES]);
+    climbers.spectra = s;
+    climbers.list = list;
+    txm_parallel_for(env, TXP_REFINED, txp_climb_one, &climbers);
+    memset(out, 0, TXP_OFFERS * sizeof *out);
+    for (int k = 0; k < TXP_OFFERS; k++) {
+        for (int i = 0; i < TXP_REFINED; i++) {
+            int is_new = list[i].score > out[k].score;
+            for (int j = 0; j < k && is_new; j++)
+                is_new = !txp_same_wave(&out[j].wave[0], &list[i].wave[0]);
+            if (is_new) out[k] = list[i];
+        }
+    }
+    for (int k = 0; k < TXP_OFFERS; k++) {
+        if (!(out[k].score > 0)) continue;
+        txp_second_wave(s, &out[k]);
+        txp_climb(s, &out[k], 2);
+        txp_prepare(s, &out[k].view, &p);
+        for (int i = 0; i < 2; i++)
+            out[k].wave[i].clear = txp_wave_clear(s, &p, out[k].wave[i].a, out[k].wave[i].b);
+    }
+}
+
+/* ---- phases: where exactly the waves of a view lie in a photograph ------------------------- */
+
+/* At each node of a grid over the photograph the gray picture is multiplied by the wave that the
+   view predicts there: the angle of the sum is by how much the wave lies beside its prediction.
+   The view and its waves are fitted to these angles by least squares: first to the differences of
+   neighbouring nodes, which do not mind errors of whole turns, then to the angles themselves. */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_NODES = 16,    /* along the longer side                                                  */
+    TXP_VIEWS = 4,     /* numbers of a view                                                       */
+    TXP_NUMBERS = 10,  /* and three of each wave                                     */
+    TXP_FIT_ROUNDS = 7 /* the first half with differences                                        */
+};
+#define TXP_LISTENING 1.25   /* periods: from the middle of a node to the rim of its window       */
+#define TXP_LISTENING_LEAST 0.12 /* half sides: the same, at least                              */
+#define TXP_HOPELESS 0.25      /* agreement after the first half: no more is tried             */
+#define TXP_OUTLIER 0.08     /* turns: residuals above count less and less                       */
+
+/* One wave at one node. */
+typedef struct txp_sight {
+    double beside; /* turns, -0.5..0.5                                            */
+    double weight; /* 0..1: how much of the contrast there is this wave; 0: none  */
+} txp_sight;
+
+typedef struct txp_nodes {
+    const txp_gray *gray;
+    int across, down, waves;
+    double half;
+    txp_spot *at;            /* across * down  */
+    txp_sight (*sight)[2];
+} txp_nodes;
+
+/* The angle of (x, y) in turns, -0.5..0.5: atan2 of the same bits everywhere. */
+static double txp_turns(double x, double y) {
+    const double ax = fabs(x), ay = fabs(y), most = ax > ay ? ax : ay, least = ax > ay ? ay : ax;
+    if (!(most > 0)) return 0;
+    double t = least / most;
+    for (int i = 0; i < 2; i++) t = t / (1 + sqrt(1 + t * t)); /* the tangent of half the angle */
+    const double tt = t * t;
+    double sum = 0;
+    for (int k = 15; k > 0; k -= 2) sum = 1.0 / k - tt * sum;
+    double angle = 4 * t * sum / (2 * TXM_PI);
+    if (ay > ax) angle = 0.25 - angle;
+    if (x < 0) angle = 0.5 - angle;
+    return y < 0 ? -angle : angle;
+}
+
+/* The phase of a wave at a place of the photograph, and the local frequency there. */
+static int txp_wave_phase(const txp_view *v, const txp_wave *w, double x, double y, double *phase,
+                          double frequency[2]) {
+    double place[2], m[4];
+    if (!txp_view_place(v, x, y, place, m)) return 0;
+    *phase = w->a * place[0] + w->b * place[1] + w->shift;
+    frequency[0] = m[0] * w->a + m[2] * w->b;
+    frequency[1] = m[1] * w->a + m[3] * w->b;
+    return 1;
+}
+
+/* Nodes over a gray picture. 0: no memory. */
+static int txp_nodes_make(const txp_gray *gray, txm_arena *arena, txp_nodes *n) {
+    const int w = gray->width, h = gray->height, longer = w > h ? w : h;
+    n->gray = gray;
+    n->half = 0.5 * longer;
+    n->across = txm_clampi((int)((int64_t)TXP_NODES * w / longer), 4, TXP_NODES);
+    n->down = txm_clampi((int)((int64_t)TXP_NODES * h / longer), 4, TXP_NODES);
+    const size_t count = (size_t)n->across * (size_t)n->down;
+    n->at = (txp_spot *)txm_arena_alloc(arena, count, sizeof *n->at);
+    n->sight = (txp_sight(*)[2])txm_arena_zero(arena, count, sizeof *n->sight);
+    if (arena->failed) return 0;
+    for (int i = 0; i < n->across * n->down; i++) {
+        const int column = i % n->across, row = i / n->across;
+        n->at[i].x = ((column + 0.5) / n->across - 0.5) * w / n->half;
+        n->at[i].y = ((row + 0.5) / n->down - 0.5) * h / n->half;
+    }
+    return 1;
+}
+
+/* How a wave lies at a place (pixels of the gray picture): its phase in turns, its local frequency in
+   cycles per pixel. */
+static int txp_lies(const txp_nodes *n, const txp_view *v, const txp_wave *w, double x, double y,
+                    double *phase, double frequency[2]) {
+    const txp_gray *g = n->gray;
+    if (!txp_wave_phase(v, w, (x + 0.5 - 0.5 * g->width) / n->half,
+                        (y + 0.5 - 0.5 * g->height) / n->half, phase, frequency))
+        return 0;
+    frequency[0] /= n->half;
+    frequency[1] /= n->half;
+    return 1;
+}
+
+/* What a node sees of a wave. */
+static txp_sight txp_see(const txp_nodes *n, const txp_view *v, const txp_wave *w, txp_spot at) {
+    txp_sight sight = {0, 0};
+    const txp_gray *g = n->gray;
+    const double cx = at.x * n->half + 0.5 * g->width - 0.5;
+    const double cy = at.y * n->half + 0.5 * g->height - 0.5;
+    double phase, f[2], sine, cosine, re = 0, im = 0, bells = 0, energy = 0;
+    if (!txp_lies(n, v, w, cx, cy, &phase, f)) return sight;
+    const double speed = sqrt(f[0] * f[0] + f[1] * f[1]);
+    if (!(speed > 1e-4) || fabs(f[0]) > 0.45 || fabs(f[1]) > 0.45) return sight;
+    const double reach =
+        fmin(fmax(TXP_LISTENING / speed, fmax(5, TXP_LISTENING_LEAST * n->half)), 0.25 * n->half);
+    const int x0 = (int)fmax(ceil(cx - reach), 0), x1 = (int)fmin(floor(cx + reach), g->width - 1);
+    const int y0 = (int)fmax(ceil(cy - reach), 0), y1 = (int)fmin(floor(cy + reach), g->height - 1);
+    for (int y = y0; y <= y1; y++) {
+        const double q = (y - cy) / reach, by = (1 - q * q) * (1 - q * q);
+        const float *row = g->at + (size_t)y * (size_t)g->width;
+        if (!txp_lies(n, v, w, cx, y, &phase, f)) continue;
+        phase += f[0] * (x0 - cx);
+        phase -= floor(phase);
+        txm_sincos(2 * TXM_PI * f[0], &sine, &cosine);
+        const double turn_re = cosine, turn_im = sine;
+        txm_sincos(2 * TXM_PI * phase, &sine, &cosine);
+        double c = cosine, s = sine;
+        for (int x = x0; x <= x1; x++) {
+            const double u = (x - cx) / reach, bell = by * (1 - u * u) * (1 - u * u);
+            const double value = (double)row[x], next = c * turn_re - s * turn_im;
+            re += bell * value * c;
+            im -= bell * value * s;
+            bells += bell;
+            energy += bell * value * value;
+            s = c * turn_im + s * turn_re;
+            c = next;
+        }
+    }
+    if (!(energy > 0)) return sight;
+    /* the value is like cos(2 pi (phase + beside)) */
+    sight.beside = txp_turns(re, im);
+    sight.weight = sqrt((re * re + im * im) / (bells * energy));
+    return sight;
+}
+
+typedef struct txp_seeing {
+    txp_nodes *nodes;
+    const txp_guess *guess;
+} txp_seeing;
+
+static void txp_see_node(void *context, int i) {
+    const txp_seeing *q = (const txp_seeing *)context;
+    const txp_nodes *n = q->nodes;
+    for (int k = 0; k < 2; k++) {
+        txp_sight none = {0, 0};
+        n->sight[i][k] =
+            k < n->waves ? txp_see(n, &q->guess->view, &q->guess->wave[k], n->at[i]) : none;
+    }
+}
+
+/* ---- least squares -------------------------------------------------------------------------- */
+
+static double txp_rest(double turns) {
+    return turns - floor(turns + 0.5);
+}
+
+/* Solve A x = b for a symmetric positive A of size n, which is overwritten; b becomes x. */
+static void txp_solve(double a[TXP_NUMBERS][TXP_NUMBERS], double *b, int n) {
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = a[i][j];
+            for (int k = 0; k < j; k++) sum -= a[i][k] * a[j][k];
+            a[i][j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / a[j][j];
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++) b[i] -= a[i][k] * b[k];
+        b[i] /= a[i][i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) b[i] -= a[k][i] * b[k];
+        b[i] /= a[i][i];
+    }
+}
+
+static double *txp_number_of(txp_guess *g, int k) {
+    txp_view *v = &g->view;
+    if (k < TXP_VIEWS) return k < 2 ? (k ? &v->tilt_y : &v->tilt_x) : k > 2 ? &v->curl : &v->bend;
+    txp_wave *w = &g->wave[(k - TXP_VIEWS) / 3];
+    const int part = (k - TXP_VIEWS) % 3;
+    return part == 0 ? &w->a : part == 1 ? &w->b : &w->shift;
+}
+
+/* The derivatives of the phase of a wave at a place by all numbers. */
+static int txp_phase_slopes(const txp_guess *g, int wave, txp_spot at, double slopes[TXP_NUMBERS]) {
+    const double little = 1e-4;
+    double place[2], m[4], frequency[2];
+    if (!txp_view_place(&g->view, at.x, at.y, place, m)) return 0;
+    for (int k = 0; k < TXP_NUMBERS; k++) slopes[k] = 0;
+    slopes[TXP_VIEWS + 3 * wave] = place[0];
+    slopes[TXP_VIEWS + 3 * wave + 1] = place[1];
+    slopes[TXP_VIEWS + 3 * wave + 2] = 1;
+    for (int k = 0; k < TXP_VIEWS; k++) {
+        txp_guess other = *g;
+        double above, below;
+        *txp_number_of(&other, k) += little;
+        if (!txp_wave_phase(&other.view, &g->wave[wave], at.x, at.y, &above, frequency)) return 0;
+        *txp_number_of(&other, k) -= 2 * little;
+        if (!txp_wave_phase(&other.view, &g->wave[wave], at.x, at.y, &below, frequency)) return 0;
+        slopes[k] = (above - below) / (2 * little);
+    }
+    return 1;
+}
+
+/* One equation: slopes . x = beside. */
+typedef struct txp_equations {
+    double a[TXP_NUMBERS][TXP_NUMBERS], b[TXP_NUMBERS];
+} txp_equations;
+
+static void txp_add_equation(txp_equations *q, const double *slopes, double beside, double weight) {
+    for (int i = 0; i < TXP_NUMBERS; i++) {
+        q->b[i] += weight * slopes[i] * beside;
+        for (int j = 0; j <= i; j++) q->a[i][j] += weight * slopes[i] * slopes[j];
+    }
+}
+
+/* Equations of all nodes, or of all pairs of neighbours. */
+static void txp_collect(const txp_nodes *n, const txp_guess *g, int differences, txp_equations *q) {
+    memset(q, 0, sizeof *q);
+    for (int i = 0; i < n->across * n->down; i++) {
+        for (int k = 0; k < n->waves; k++) {
+            const txp_sight *s = &n->sight[i][k];
+            double slopes[TXP_NUMBERS], other[TXP_NUMBERS];
+            if (!(s->weight > 0) || !txp_phase_slopes(g, k, n->at[i], slopes)) continue;
+            if (!differences) {
+                const double r = s->beside / TXP_OUTLIER;
+                txp_add_equation(q, slopes, s->beside, s->weight * s->weight / (1 + r * r));
+                continue;
+            }
+            for (int d = 0; d < 2; d++) {
+                const int j = d ? i + n->across : i + 1;
+                if (d ? j >= n->across * n->down : j % n->across == 0) continue;
+                const txp_sight *t = &n->sight[j][k];
+                if (!(t->weight > 0) || !txp_phase_slopes(g, k, n->at[j], other)) continue;
+                for (int c = 0; c < TXP_NUMBERS; c++) other[c] -= slopes[c];
+                const double step = txp_rest(t->beside - s->beside), r = step / (2 * TXP_OUTLIER);
+                txp_add_equation(q, other, step, s->weight * t->weight / (1 + r * r));
+            }
+        }
+    }
+}
+
+/* By how much the phases of a wave agree with it over the picture, -1..1. */
+static double txp_agreement(const txp_nodes *n, int k) {
+    double re = 0, sum = 0, sine, cosine;
+    for (int i = 0; i < n->across * n->down; i++) {
+        const txp_sight *s = &n->sight[i][k];
+        txm_sincos(2 * TXM_PI * s->beside, &sine, &cosine);
+        re += s->weight * cosine;
+        sum += s->weight;
+    }
+    return sum > 0 ? re / sum : 0;
+}
+
+static double txp_mean_weight(const txp_nodes *n, int k) {
+    double sum = 0;
+    for (int i = 0; i < n->across * n->down; i++) sum += n->sight[i][k].weight;
+    return sum / (n->across * n->down);
+}
+
+/* Turn each wave so that the mean of its residuals is 0. */
+static void txp_set_shifts(const txp_nodes *n, txp_guess *g) {
+    for (int k = 0; k < n->waves; k++) {
+        double re = 0, im = 0, sine, cosine;
+        for (int i = 0; i < n->across * n->down; i++) {
+            const txp_sight *s = &n->sight[i][k];
+            txm_sincos(2 * TXM_PI * s->beside, &sine, &cosine);
+            re += s->weight * cosine;
+            im += s->weight * sine;
+        }
+        g->wave[k].shift = txp_rest(g->wave[k].shift + txp_turns(re, im));
+    }
+}
+
+/* Fit the view and its waves to the phases; clear of each wave receives how well they agree, and
+   the score their sum. */
+static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
+    txp_seeing seeing;
+    txp_equations q;
+    seeing.nodes = n;
+    seeing.guess = g;
+    n->waves = g->wave[1].clear > 0 ? 2 : 1;
+    for (int round = 0; round < TXP_FIT_ROUNDS; round++) {
+        const int differences = round < TXP_FIT_ROUNDS / 2;
+        txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
+        if (round == TXP_FIT_ROUNDS / 2) {
+            txp_set_shifts(n, g);
+            txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
+            double most = 0;
+            for (int k = 0; k < n->waves; k++) most = fmax(most, txp_agreement(n, k));
+            if (most < TXP_HOPELESS) break;
+        }
+        txp_collect(n, g, differences, &q);
+        for (int k = 0; k < TXP_NUMBERS; k++) q.a[k][k] += (k < TXP_VIEWS ? 1e-2 : 1e-6) + 1e-4 * q.a[k][k];
+        txp_solve(q.a, q.b, TXP_NUMBERS);
+        for (int k = 0; k < TXP_NUMBERS; k++) *txp_number_of(g, k) += q.b[k];
+    }
+    txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
+    for (int k = 0; k < 2; k++) {
+        g->wave[k].clear = k < n->waves ? txp_agreement(n, k) : 0;
+        g->wave[k].contrast = k < n->waves ? txp_mean_weight(n, k) : 0;
+    }
+}
+
+/* ---- finding the pattern of a photograph --------------------------------------------------- */
+
+/* ours, see docs/choices.md */
+#define TXP_CLEAR_LEAST 0.72 /* agreement of the phases of the first wave, 0..1: else no pattern  */
+#define TXP_SECOND_LEAST 0.6 /* the same of the second one: else it is left out                   */
+#define TXP_CONTRAST 0.03    /* of a wave, 0..1, that counts half                                 */
+#define TXP_CONVINCING 1.3   /* score from which on nothing else is tried                         */
+#define TXP_LEAST_PERIODS 1.5 /* of a wave in half of the longer side                             */
+#define TXP_BEND_MOST 0.5    /* of a lens, |bend| and |curl|                                      */
+#define TXP_FREQUENCY 0.2    /* cycles per pixel, at most, in the picture the phases are read from */
+
+/* What is found: score 0: no pattern. */
+typedef struct txp_sighting {
+    txp_guess guess;
+    int size; /* the picture the phases are read from */
+} txp_sighting;
+
+/* The smallest picture that shows all waves of a guess well. */
+static int txp_size_for(const txp_gray *sizes, int count, const txp_guess *g) {
+    double most = 0;
+    for (int k = 0; k < 2; k++) {
+        const txp_wave *w = &g->wave[k];
+        if (w->clear > 0) most = fmax(most, w->a * w->a + w->b * w->b);
+    }
+    for (int i = count - 1; i > 0; i--) {
+        const int longer = sizes[i].width > sizes[i].height ? sizes[i].width : sizes[i].height;
+        if (most <= (TXP_FREQUENCY * longer / 2) * (TXP_FREQUENCY * longer / 2)) return i;
+    }
+    return 0;
+}
+
+/* How much a fitted guess is worth: agreement of its waves, weak ones less. 0: it is no pattern. */
+static double txp_worth(const txp_nodes *n, txp_guess *g) {
+    const txp_view *v = &g->view;
+    double sum = 0;
+    const double reach_x = 0.5 * n->gray->width / n->half, reach_y = 0.5 * n->gray->height / n->half;
+    if (fabs(v->bend) > TXP_BEND_MOST || fabs(v->curl) > TXP_BEND_MOST) return 0;
+    if (!(fabs(v->tilt_x) * reach_x + fabs(v->tilt_y) * reach_y < 0.95)) return 0;
+    if (g->wave[1].clear > g->wave[0].clear) {
+        const txp_wave first = g->wave[0];
+        g->wave[0] = g->wave[1];
+        g->wave[1] = first;
+    }
+    const txp_wave *a = &g->wave[0], *b = &g->wave[1];
+    const double cross = a->a * b->b - a->b * b->a;
+    const double aa = a->a * a->a + a->b * a->b, bb = b->a * b->a + b->b * b->b;
+    const double least = TXP_LEAST_PERIODS * TXP_LEAST_PERIODS;
+    if (b->clear < TXP_SECOND_LEAST || bb < least ||
+        cross * cross < TXP_APART * TXP_APART * aa * bb)
+        g->wave[1].clear = 0;
+    if (a->clear < TXP_CLEAR_LEAST || aa < least) return 0;
+    for (int k = 0; k < 2; k++)
+        sum += g->wave[k].clear * g->wave[k].clear * g->wave[k].contrast /
+               (g->wave[k].contrast + TXP_CONTRAST);
+    return sum;
+}
+
+/* Try the guesses of one scale. 0: no memory. */
+static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm_env *env,
+                         txp_sighting *best) {
+    txm_arena scratch;
+    txp_spectra spectra;
+    txp_guess offers[TXP_OFFERS];
+    txm_arena_init(&scratch, env);
+    int done = txp_spectra_make(&sizes[at], side, &scratch, env, &spectra);
+    if (done) txp_search_view(&spectra, env, offers);
+    for (int k = 0; k < TXP_OFFERS && done; k++) {
+        txp_nodes nodes;
+        txp_guess g = offers[k];
+        if (!(g.score > 0) || best->guess.score >= TXP_CONVINCING) break;
+        const int size = txp_size_for(sizes, count, &g);
+        done = txp_nodes_make(&sizes[size], &scratch, &nodes);
+        if (!done) break;
+        txp_fit_phases(&nodes, env, &g);
+        g.score = txp_worth(&nodes, &g);
+        if (g.score > best->guess.score) {
+            best->guess = g;
+            best->size = size;
+        }
+    }
+    txm_arena_free(&scratch);
+    return done;
+}
+
+/* The view and the waves of a photograph; sizes: its evened pictures. */
+static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *env,
+                                   txp_sighting *found) {
+    memset(found, 0, sizeof *found);
+    for (int at = count - 1; at >= 0; at--) {
+        const txp_gray *g = &sizes[at];
+        const int least = g->width < g->height ? g->width : g->height;
+        for (int side = TXP_WINDOW_SIDE; side >= TXP_WINDOW_SIDE / 4; side /= 2) {
+            /* small windows only where large ones would be too few */
+            if (least < side || (side < TXP_WINDOW_SIDE && least >= 4 * side)) continue;
+            if (found->guess.score >= TXP_CONVINCING) return TXM_OK;
+            if (txm_progress(env, 0.5f * (float)(count - at) / (float)(count + 1), "lattice"))
+                return txm_fail(env, TXM_CANCELLED, "cancelled");
+            if (!txp_try_scale(sizes, count, at, side, env, found))
+                return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+        }
+    }
+    return TXM_OK;
+}
+
+/* ---- the upright frame of a pattern -------------------------------------------------------- */
+
+/* Which way is up, how wide a brick is and where the picture ends. The plane (X, Y) of a view still
+   lacks an affine map: its stretch follows from the tilt and the focal length, its turn and shear
+   from the edges in the picture, which in masonry, tiles, planks and cloth have two directions. */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_DIRECTIONS = 360, /* of edges: half a degree each                                        */
+    TXP_BLURRED = 4,      /* of them to each side are one direction                              */
+    TXP_BLURS = 2,        /* of 3 x 3 pixels before edges are looked for                         */
+    TXP_SNAP = 2,         /* an edge is along a wave within so many                              */
+    TXP_SQUARE_LEAST = 2, /* the second axis is within so many of the normal of the first ...    */
+    TXP_SQUARE_MOST = 40, /* ... or, in a tilted view, so many                                   */
+    TXP_CELLS = 72,       /* cells along the sides of the plane when the frame is chosen         */
+    TXP_EDGES_FROM = 300  /* pixels: longer side of the picture whose edges are looked at        */
+};
+#define TXP_FOCAL 0.85      /* longer sides: of a camera of which nothing is known               */
+#define TXP_SQUARE_TILTED 80 /* directions for each unit by which the stretch is uncertain        */
+#define TXP_FOCAL_RANGE 1.7 /* it is between this part and so many times as long                  */
+#define TXP_WAVE_EDGES 0.6  /* of the most edges: with so many along it a wave is an axis         */
+#define TXP_UPRIGHT 0.8     /* edges of this part do not count if they lie at 45 degrees          */
+#define TXP_SIMPLE 0.25     /* what each wave in a sum costs, of its edges                        */
+#define TXP_CLEAR_EDGES 1.4 /* of the mean: a direction with so many edges is one               */
+#define TXP_FAR_SIDE 0.3    /* of the scale in the middle: what is smaller is cut off           */
+
+/* From the plane (X, Y) to the frame, x = xx X + xy Y + x0, and back to the photograph. */
+typedef struct txp_frame {
+    txp_view view;
+    double xx, xy, yx, yy;  /* to the frame, in half sides of the photograph                     */
+    double left, top, scale; /* of the output: pixels = (x - left) scale                         */
+    int width, height;
+    double half, middle_x, middle_y; /* of the photograph, in its pixels                          */
+} txp_frame;
+
+/* A blurred copy of a gray picture, in which noise and the blocks of JPEG have fewer edges. 0: no
+   memory. */
+static int txp_blur(const txp_gray *from, txm_arena *arena, txp_gray *to) {
+    const size_t count = (size_t)from->width * (size_t)from->height;
+    float *copy = (float *)txm_arena_alloc(arena, count, sizeof *copy);
+    double *sums = (double *)txm_arena_alloc(arena, (size_t)from->width, sizeof *sums);
+    if (!txp_gray_new(to, from->width, from->height, arena)) return 0;
+    memcpy(to->at, from->at, count * sizeof *to->at);
+    memcpy(to->known, from->known, count * sizeof *to->known);
+    for (int i = 0; i < TXP_BLURS; i++)
+        txp_box_sums(to->at, from->width, from->height, 1, sums, copy);
+    return 1;
+}
+
+/* The histogram of the directions of edges on the plane, as bins of half turns; s: the stretch. */
+static void txp_edge_directions(const txp_gray *g, const txp_view *v, const double s[4],
+                                double *bins) {
+    double sums[TXP_DIRECTIONS] = {0};
+    const double half = 0.5 * (g->width > g->height ? g->width : g->height);
+    const double det_s = s[0] * s[3] - s[1] * s[2];
+    for (int y = 1; y + 1 < g->height; y++) {
+        const float *row = g->at + (size_t)y * (size_t)g->width;
+        const float *known = g->known + (size_t)y * (size_t)g->width;
+        for (int x = 1; x + 1 < g->width; x++) {
+            double place[2], m[4];
+            if (known[x] < 1) continue;
+            /* Scharr's derivatives, whose direction is right */
+            const float *t = row + x - g->width, *b = row + x + g->width;
+            const double gx = 3 * ((double)t[1] - (double)t[-1] + (double)b[1] - (double)b[-1]) +
+                              10 * ((double)row[x + 1] - (double)row[x - 1]);
+            const double gy = 3 * ((double)b[1] - (double)t[1] + (double)b[-1] - (double)t[-1]) +
+                              10 * ((double)b[0] - (double)t[0]);
+            if (!txp_view_place(v, (x + 0.5 - 0.5 * g->width) / half,
+                                (y + 0.5 - 0.5 * g->height) / half, place, m))
+                continue;
+            const double det = m[0] * m[3] - m[1] * m[2];
+            const double px = (m[3] * gx - m[2] * gy) / det, py = (m[0] * gy - m[1] * gx) / det;
+            const double qx = (s[3] * px - s[2] * py) / det_s;
+            const double qy = (s[0] * py - s[1] * px) / det_s;
+            double turn = 2 * txp_turns(qx, qy); /* opposite directions are one */
+            turn -= floor(turn);
+            /* squared once more, so that noise counts less than lines */
+            const double strength = gx * gx + gy * gy;
+            sums[(int)(turn * TXP_DIRECTIONS) % TXP_DIRECTIONS] += strength * strength;
+        }
+    }
+    for (int i = 0; i < TXP_DIRECTIONS; i++) {
+        bins[i] = 0;
+        for (int d = -TXP_BLURRED; d <= TXP_BLURRED; d++)
+            bins[i] += (TXP_BLURRED + 1 - abs(d)) *
+                       sums[(i + d + TXP_DIRECTIONS) % TXP_DIRECTIONS];
+    }
+}
+
+/* The bin of most edges within reach of a bin, with the fraction by a parabola. */
+static double txp_edge_peak(const double *bins, int middle, int reach, double *height) {
+    int best = middle;
+    for (int d = -reach; d <= reach; d++) {
+        const int i = (middle + d + 2 * TXP_DIRECTIONS) % TXP_DIRECTIONS;
+        if (bins[i] > bins[best]) best = i;
+    }
+    const double l = bins[(best + TXP_DIRECTIONS - 1) % TXP_DIRECTIONS];
+    const double r = bins[(best + 1) % TXP_DIRECTIONS], c = bins[best];
+    *height = c;
+    return best + 0.5 + (l + r < 2 * c ? 0.5 * (l - r) / (l + r - 2 * c) : 0);
+}
+
+/* The direction of a vector as a bin. */
+static double txp_direction_of(double x, double y) {
+    const double turn = 2 * txp_turns(x, y);
+    return (turn - floor(turn)) * TXP_DIRECTIONS;
+}
+
+static double txp_bins_apart(double a, double b) {
+    const double d = fabs(a - b);
+    return fmin(d, TXP_DIRECTIONS - d);
+}
+
+/* The plane's stretch by which distances become those of the wall: it was seen from the side. */
+static void txp_stretch(const txp_view *v, double focal, double s[4], double *stretch) {
+    const double tt = v->tilt_x * v->tilt_x + v->tilt_y * v->tilt_y;
+    *stretch = sqrt(1 + 4 * focal * focal * tt);
+    const double part = tt > 0 ? (*stretch - 1) / tt : 0;
+    s[0] = 1 + part * v->tilt_x * v->tilt_x;
+    s[1] = s[2] = part * v->tilt_x * v->tilt_y;
+    s[3] = 1 + part * v->tilt_y * v->tilt_y;
+}
+
+/* Among the waves and simple sums of both: the one within reach of a direction along which most
+   edges lie, simple ones first. Returns how many edges; *direction is left alone if there is none. */
+static double txp_wave_direction(const txp_guess *g, const double s[4], const double *bins,
+                                 double reach, double *direction) {
+    const double det = s[0] * s[3] - s[1] * s[2], middle = *direction;
+    const txp_wave *w = g->wave;
+    double most = 0, edges = 0;
+    const int last = w[1].clear > 0 ? 2 : 0;
+    for (int i = 0; i <= 2; i++) {
+        for (int j = -last; j <= last; j++) {
+            const double a = i * w[0].a + j * w[1].a, b = i * w[0].b + j * w[1].b;
+            const int terms = i + abs(j);
+            if (!(a * a + b * b > 0) || terms > 3) continue;
+            const double to =
+                txp_direction_of((s[3] * a - s[2] * b) / det, (s[0] * b - s[1] * a) / det);
+            if (txp_bins_apart(to, middle) > reach) continue;
+            const double height = bins[(int)to % TXP_DIRECTIONS];
+            if (!(height * (1 - TXP_SIMPLE * terms) > most)) continue;
+            most = height * (1 - TXP_SIMPLE * terms);
+            edges = height;
+            *direction = to;
+        }
+    }
+    return edges;
+}
+
+/* The two axes of a pattern, as directions across its edges; s: the stretch. */
+static void txp_find_axes(const txp_gray *g, const txp_guess *guess, double focal, double s[4],
+                          double axes[2]) {
+    double bins[TXP_DIRECTIONS], mean = 0, height, unused[4], shorter, longer, stretch;
+    txp_stretch(&guess->view, focal / TXP_FOCAL_RANGE, unused, &shorter);
+    txp_stretch(&guess->view, focal * TXP_FOCAL_RANGE, unused, &longer);
+    txp_stretch(&guess->view, focal, s, &stretch);
+    txp_edge_directions(g, &guess->view, s, bins);
+    for (int i = 0; i < TXP_DIRECTIONS; i++) {
+        /* who photographs a wall holds the camera nearly upright */
+        const double off = fmin(fmin(i, TXP_DIRECTIONS - i), abs(i - TXP_DIRECTIONS / 2));
+        bins[i] *= 1 - TXP_UPRIGHT * off / (0.25 * TXP_DIRECTIONS);
+        mean += bins[i] / TXP_DIRECTIONS;
+    }
+    axes[0] = txp_edge_peak(bins, 0, TXP_DIRECTIONS / 2, &height);
+    double wave = axes[0];
+    const double edges = txp_wave_direction(guess, s, bins, TXP_DIRECTIONS, &wave);
+    if (edges > TXP_WAVE_EDGES * height || height < TXP_CLEAR_EDGES * mean) axes[0] = wave;
+    /* the focal length is a guess: in a tilted view the other axis need not be the normal */
+    double normal = axes[0] + 0.5 * TXP_DIRECTIONS;
+    if (normal >= TXP_DIRECTIONS) normal -= TXP_DIRECTIONS;
+    const int reach =
+        (int)fmin(TXP_SQUARE_LEAST + TXP_SQUARE_TILTED * (longer / shorter - 1),
+                  TXP_SQUARE_MOST);
+    axes[1] = txp_edge_peak(bins, (int)normal, reach, &height);
+    if (height < TXP_CLEAR_EDGES * mean) axes[1] = normal;
+    wave = normal;
+    if (txp_wave_direction(guess, s, bins, reach + TXP_SNAP, &wave) > TXP_WAVE_EDGES * height)
+        axes[1] = wave;
+}
+
+/* The frame whose axes these are: x is the one that is nearer to the rows of the photograph. */
+static void txp_set_axes(const double s[4], const double axes[2], txp_frame *f) {
+    double rows[2][2];
+    for (int k = 0; k < 2; k++) {
+        double sine, cosine;
+        txm_sincos(TXM_PI * axes[k] / TXP_DIRECTIONS, &sine, &cosine);
+        rows[k][0] = cosine * s[0] + sine * s[2];
+        rows[k][1] = cosine * s[1] + sine * s[3];
+    }
+    const double as_they_are = fabs(rows[0][0] * rows[1][1]);
+    const int first = as_they_are >= fabs(rows[0][1] * rows[1][0]) ? 0 : 1;
+    const double sx = rows[first][0] < 0 ? -1 : 1, sy = rows[1 - first][1] < 0 ? -1 : 1;
+    f->xx = sx * rows[first][0];
+    f->xy = sx * rows[first][1];
+    f->yx = sy * rows[1 - first][0];
+    f->yy = sy * rows[1 - first][1];
+}
+
+/* ---- from the frame to the photograph ------------------------------------------------------ */
+
+/* Undo the lens: the radius of which lens(radius) is r. */
+static double txp_undo_lens(const txp_view *v, double r) {
+    double p = r;
+    for (int i = 0; i < 12; i++) {
+        const double pp = p * p, value = p * (1 + pp * (v->bend + pp * v->curl)) - r;
+        const double slope = 1 + pp * (3 * v->bend + 5 * pp * v->curl);
+        if (!(slope > 0.02)) return -1;
+        p -= value / slope;
+    }
+    return p;
+}
+
+/* The place of the photograph, in half sides from its middle, at (x, y) of the frame; m: its
+   derivatives by x and y. 0: there is none. */
+static int txp_frame_place(const txp_frame *f, double x, double y, double *px, double *py,
+                           double m[4]) {
+    const txp_view *v = &f->view;
+    const double det = f->xx * f->yy - f->xy * f->yx;
+    const double ux = (f->yy * x - f->xy * y) / det, uy = (f->xx * y - f->yx * x) / det;
+    const double depth = 1 - v->tilt_x * ux - v->tilt_y * uy;
+    double place[2], k[4];
+    if (!(depth > 0.05)) return 0;
+    const double qx = ux / depth, qy = uy / depth, r = sqrt(qx * qx + qy * qy);
+    if (r > 3) return 0;
+    const double p = txp_undo_lens(v, r);
+    if (!(p >= 0) || !(p < 3)) return 0;
+    *px = r > 0 ? qx * p / r : 0;
+    *py = r > 0 ? qy * p / r : 0;
+    if (!txp_view_place(v, *px, *py, place, k)) return 0;
+    /* frame by photograph, inverted */
+    const double a = f->xx * k[0] + f->xy * k[2], b = f->xx * k[1] + f->xy * k[3];
+    const double c = f->yx * k[0] + f->yy * k[2], d = f->yx * k[1] + f->yy * k[3];
+    const double whole = a * d - b * c;
+    if (!(fabs(whole) > 1e-9)) return 0;
+    m[0] = d / whole;
+    m[1] = -b / whole;
+    m[2] = -c / whole;
+    m[3] = a / whole;
+    return 1;
+}
+
+/* ---- the rectangle -------------------------------------------------------------------------- */
+
+/* Sums over all cells above and to the left. */
+typedef struct txp_survey {
+    double inside[TXP_CELLS + 1][TXP_CELLS + 1];
+    int outside[TXP_CELLS + 1][TXP_CELLS + 1];
+    double scale[TXP_CELLS][TXP_CELLS];
+} txp_survey;
+
+/* The box of the frame that holds the photograph. */
+static void txp_frame_box(const txp_frame *f, double reach_x, double reach_y, double box[4]) {
+    enum { STEPS = 48 };
+    box[0] = box[1] = 1e30;
+    box[2] = box[3] = -1e30;
+    for (int i = 0; i <= STEPS; i++) {
+        for (int j = 0; j <= STEPS; j++) {
+            double place[2], m[4];
+            if (!txp_view_place(&f->view, (2.0 * i / STEPS - 1) * reach_x,
+                                (2.0 * j / STEPS - 1) * reach_y, place, m))
+                continue;
+            /* what is too far away to be seen well is cut off */
+            const double size = m[0] * m[3] - m[1] * m[2];
+            if (!(size * TXP_FAR_SIDE * TXP_FAR_SIDE < 1)) continue;
+            const double x = f->xx * place[0] + f->xy * place[1];
+            const double y = f->yx * place[0] + f->yy * place[1];
+            box[0] = fmin(box[0], x);
+            box[1] = fmin(box[1], y);
+            box[2] = fmax(box[2], x);
+            box[3] = fmax(box[3], y);
+        }
+    }
+}
+
+/* The upright rectangle that shows most of the photograph and nothing beyond it: part of the box. */
+static int txp_frame_rectangle(const txp_frame *f, double reach_x, double reach_y,
+                               const double box[4], txp_survey *c, int best[4]) {
+    double most = 0;
+    memset(c, 0, sizeof *c);
+    for (int y = 0; y < TXP_CELLS; y++) {
+        for (int x = 0; x < TXP_CELLS; x++) {
+            double px = 0, py = 0, m[4] = {0, 0, 0, 0};
+            const double fx = box[0] + (box[2] - box[0]) * (x + 0.5) / TXP_CELLS;
+            const double fy = box[1] + (box[3] - box[1]) * (y + 0.5) / TXP_CELLS;
+            const int is_in = txp_frame_place(f, fx, fy, &px, &py, m) && fabs(px) <= reach_x &&
+                              fabs(py) <= reach_y;
+            const double size = is_in ? fabs(m[0] * m[3] - m[1] * m[2]) : 0;
+            c->scale[y][x] = sqrt(size);
+            c->inside[y + 1][x + 1] =
+                size + c->inside[y][x + 1] + c->inside[y + 1][x] - c->inside[y][x];
+            c->outside[y + 1][x + 1] =
+                !is_in + c->outside[y][x + 1] + c->outside[y + 1][x] - c->outside[y][x];
+        }
+    }
+    for (int y0 = 0; y0 < TXP_CELLS; y0++) {
+        for (int y1 = y0 + 1; y1 <= TXP_CELLS; y1++) {
+            for (int x0 = 0; x0 < TXP_CELLS; x0++) {
+                for (int x1 = x0 + 1; x1 <= TXP_CELLS; x1++) {
+                    if (c->outside[y1][x1] - c->outside[y0][x1] - c->outside[y1][x0] +
+                        c->outside[y0][x0])
+                        break;
+                    const double sum = c->inside[y1][x1] - c->inside[y0][x1] - c->inside[y1][x0] +
+                                       c->inside[y0][x0];
+                    if (sum <= most) continue;
+                    most = sum;
+                    best[0] = x0;
+                    best[1] = y0;
+                    best[2] = x1;
+                    best[3] = y1;
+                }
+            }
+        }
+    }
+    return most > 0;
+}
+
+/* Choose rectangle and resolution: as fine as the photograph is anywhere in the rectangle, but not
+   more than twice its pixels. 0: nothing is left. */
+static int txp_frame_choose(txp_frame *f, int width, int height, txp_survey *c) {
+    double box[4], finest = 0;
+    int best[4] = {0, 0, 0, 0};
+    f->half = 0.5 * (width > height ? width : height);
+    f->middle_x = 0.5 * width;
+    f->middle_y = 0.5 * height;
+    const double reach_x = (f->middle_x - 0.5) / f->half, reach_y = (f->middle_y - 0.5) / f->half;
+    txp_frame_box(f, reach_x, reach_y, box);
+    if (!(box[2] > box[0] && box[3] > box[1]) ||
+        !txp_frame_rectangle(f, reach_x, reach_y, box, c, best))
+        return 0;
+    for (int y = best[1]; y < best[3]; y++)
+        for (int x = best[0]; x < best[2]; x++) finest = fmax(finest, c->scale[y][x]);
+    const double step_x = (box[2] - box[0]) / TXP_CELLS, step_y = (box[3] - box[1]) / TXP_CELLS;
+    /* middles of the outermost cells are inside for certain */
+    const double w = (best[2] - best[0] - 1) * step_x, h = (best[3] - best[1] - 1) * step_y;
+    f->left = box[0] + (best[0] + 0.5) * step_x;
+    f->top = box[1] + (best[1] + 0.5) * step_y;
+    f->scale = finest * f->half;
+    const double most = 2.0 * width * height;
+    if (w * h * f->scale * f->scale > most) f->scale = sqrt(most / (w * h));
+    f->width = (int)floor(w * f->scale);
+    f->height = (int)floor(h * f->scale);
+    return f->width >= 1 && f->height >= 1;
+}
+
+/* ---- drawing a photograph from straight in front ------------------------------------------- */
+
+struct texpatch_straight {
+    txm_arena memory; /* holds this block, too */
+    int found;
+    int photo_width, photo_height;
+    txp_frame frame;
+    double clear;
+};
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_STRIDE = 16,     /* pixels of a row from one exact position to the next; linear between  */
+    TXP_MOST_SAMPLES = 4 /* across and down, of one pixel, where the picture shrinks             */
+};
+#define TXP_SHRINKING 1.3 /* pixels of the photograph per pixel, from which on more are taken     */
+
+/* Where a pixel of the result lies in the photograph; m: pixels per pixel. */
+static int txp_straight_at(const txp_frame *f, double x, double y, double *px, double *py,
+                           double m[4]) {
+    if (!txp_frame_place(f, f->left + (x + 0.5) / f->scale, f->top + (y + 0.5) / f->scale, px, py, m))
+        return 0;
+    *px = *px * f->half + f->middle_x - 0.5;
+    *py = *py * f->half + f->middle_y - 0.5;
+    for (int i = 0; i < 4; i++) m[i] *= f->half / f->scale;
+    return 1;
+}
+
+typedef struct txp_rectifying {
+    const txp_frame *frame;
+    const txm_image *image, *out;
+    texpatch_map kind;
+} txp_rectifying;
+
+/* Sample c of a pixel, in the unit of its type. */
+static inline double txp_raw(const void *row, txm_sample sample, size_t i) {
+    if (sample == TXM_U8) return (double)((const uint8_t *)row)[i];
+    if (sample == TXM_U16) return (double)((const uint16_t *)row)[i];
+    return (double)((const float *)row)[i];
+}
+
+/* Add a weighted sample at (x, y), between pixels, to sum: all channels, weighted by the last if
+   it is alpha. */
+static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha, double *sum) {
+    const double fx = floor(x), fy = floor(y);
+    double wx[4], wy[4];
+    const int x0 = (int)fx - 1, y0 = (int)fy - 1, n = im->channels;
+    size_t at[4];
+    txp_cubic(x - fx, wx);
+    txp_cubic(y - fy, wy);
+    for (int i = 0; i < 4; i++) at[i] = (size_t)txm_clampi(x0 + i, 0, im->width - 1) * (size_t)n;
+    for (int j = 0; j < 4; j++) {
+        const void *row = (const char *)im->pixels +
+                          im->stride * (ptrdiff_t)txm_clampi(y0 + j, 0, im->height - 1);
+        for (int i = 0; i < 4; i++) {
+            const double w = wx[i] * wy[j];
+            if (has_alpha) {
+                const double alpha = w * txp_raw(row, im->sample, at[i] + (size_t)n - 1);
+                for (int c = 0; c < n - 1; c++)
+                    sum[c] += alpha * txp_raw(row, im->sample, at[i] + (size_t)c);
+                sum[n - 1] += alpha;
+            } else {
+                for (int c = 0; c < n; c++) sum[c] += w * txp_raw(row, im->sample, at[i] + (size_t)c);
+            }
+        }
+    }
+}
+
+/* Turn a normal with the picture: by the rotation that is nearest to the map m. */
+static void txp_turn_normal(const double m[4], int is_down, float *v) {
+    const double a = m[0] + m[3], b = m[2] - m[1], l = sqrt(a * a + b * b);
+    const double down = is_down ? 1 : -1; /* rows run downwards */
+    const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
+    double nz = 2 * (double)v[2] - 1;
+    if (!(l > 0)) return;
+    /* a vector of the photograph, seen from the result */
+    double x = (a * nx + b * ny) / l, y = (a * ny - b * nx) / l;
+    double length = sqrt(x * x + y * y + nz * nz);
+    if (!(length > 1e-6)) {
+        x = y = 0;
+        nz = length = 1;
+    }
+    v[0] = txm_float(0.5 + 0.5 * x / length);
+    v[1] = txm_float(0.5 + 0.5 * y / length * down);
+    v[2] = txm_float(0.5 + 0.5 * nz / length);
+}
+
+/* One pixel of the result, whose middle lies at (px, py) of the photograph. */
+static void txp_rectify_pixel(const txp_rectifying *q, double px, double py, const double m[4],
+                              int samples, float *v) {
+    const txm_image *im = q->image;
+    const int n = im->channels, has_alpha = !q->kind.is_data && (n == 2 || n == 4);
+    const double unit = im->sample == TXM_U8 ? 255 : im->sample == TXM_U16 ? 65535 : 1;
+    double sum[4] = {0, 0, 0, 0};
+    if (q->kind.is_label) {
+        const int x = txm_clampi((int)floor(px + 0.5), 0, im->width - 1);
+        const int y = txm_clampi((int)floor(py + 0.5), 0, im->height - 1);
+        for (int c = 0; c < n; c++) v[c] = txm_image_get(im, x, y, c);
+        return;
+    }
+    for (int j = 0; j < samples; j++) {
+        for (int i = 0; i < samples; i++) {
+            const double u = (i + 0.5) / samples - 0.5, t = (j + 0.5) / samples - 0.5;
+            txp_add_cubic(im, px + m[0] * u + m[1] * t, py + m[2] * u + m[3] * t, has_alpha, sum);
+        }
+    }
+    if (has_alpha) {
+        const double alpha = sum[n - 1];
+        for (int c = 0; c < n - 1; c++)
+            v[c] = alpha > 0 ? txm_float(sum[c] / alpha / unit) : 0;
+        v[n - 1] = txm_float(alpha / (samples * samples * unit));
+    } else {
+        for (int c = 0; c < n; c++) v[c] = txm_float(sum[c] / (samples * samples * unit));
+    }
+    if (q->kind.is_normal) txp_turn_normal(m, q->kind.is_normal == 2, v);
+}
+
+static void txp_rectify_row(void *context, int y) {
+    const txp_rectifying *q = (const txp_rectifying *)context;
+    const txm_image *out = q->out;
+    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1};
+    int samples = 1;
+    for (int x = 0; x < out->width; x++) {
+        float v[4] = {0, 0, 0, 0};
+        const int part = x % TXP_STRIDE;
+        if (part == 0) {
+            txp_straight_at(q->frame, x + TXP_STRIDE, y, &x1, &y1, m);
+            txp_straight_at(q->frame, x, y, &x0, &y0, m);
+            const double wide = sqrt(m[0] * m[0] + m[2] * m[2]);
+            const double high = sqrt(m[1] * m[1] + m[3] * m[3]), most = fmax(wide, high);
+            samples = most < TXP_SHRINKING ? 1 : txm_clampi((int)ceil(most), 1, TXP_MOST_SAMPLES);
+        }
+        const double t = (double)part / TXP_STRIDE;
+        txp_rectify_pixel(q, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, m, samples, v);
+        for (int c = 0; c < out->channels; c++) txm_image_set(out, x, y, c, v[c]);
+    }
+}
+
+/* ---- the calls ------------------------------------------------------------------------------ */
+
+static txm_status txp_straight_check(const texpatch_straight_desc *d, txm_env *env) {
+    if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
+    txm_status status = txp_check_picture(&d->photo, "photo", env);
+    if (status == TXM_OK && d->mask.pixels)
+        status = txp_check_mask(&d->mask, "mask", d->photo.width, d->photo.height, env);
+    if (status != TXM_OK) return status;
+    if (!txp_is_within(d->focal, 0, 100) || (d->focal > 0 && d->focal < 0.1f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "focal must be 0.1 to 100 longer sides, or 0");
+    return TXM_OK;
+}
+
+/* Find pattern and frame; scratch holds what is only needed here. */
+static txm_status txp_straight_search(const texpatch_straight_desc *d, txm_arena *scratch,
+                                      txm_env *env, texpatch_straight *s) {
+    txp_gray sizes[TXP_SIZES];
+    txp_sighting found;
+    const txm_image photo = txm_image_resolve(d->photo);
+    txp_survey *cells = (txp_survey *)txm_arena_alloc(scratch, 1, sizeof *cells);
+    if (txm_progress(env, 0, "lattice")) return txm_fail(env, TXM_CANCELLED, "cancelled");
+    const int count = txp_evened_sizes(&photo, &d->mask, scratch, env, sizes);
+    if (!count || !cells) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+    const txm_status status = txp_find_pattern(sizes, count, env, &found);
+    if (status != TXM_OK || !(found.guess.score > 0)) return status;
+    int at = 0;
+    while (at + 1 < count && (sizes[at + 1].width > sizes[at + 1].height
+                                  ? sizes[at + 1].width
+                                  : sizes[at + 1].height) >= TXP_EDGES_FROM)
+        at++;
+    s->frame.view = found.guess.view;
+    s->clear = found.guess.wave[0].clear;
+    double stretch[4], axes[2];
+    txp_gray blurred;
+    if (!txp_blur(&sizes[at], scratch, &blurred))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+    txp_find_axes(&blurred, &found.guess, d->focal > 0 ? (double)d->focal : TXP_FOCAL, stretch,
+                  axes);
+    txp_set_axes(stretch, axes, &s->frame);
+    s->found = txp_frame_choose(&s->frame, photo.width, photo.height, cells);
+    return TXM_OK;
+}
+
+TEXPATCH_API txm_status texpatch_straight_find(const texpatch_straight_desc *desc, txm_env *env,
+                                               texpatch_straight **out) {
+    txm_arena memory, scratch;
+    if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
+    *out = NULL;
+    txm_status status = txp_straight_check(desc, env);
+    if (status != TXM_OK) return status;
+    txm_arena_init(&memory, env);
+    txm_arena_init(&scratch, env);
+    texpatch_straight *s = (texpatch_straight *)txm_arena_zero(&memory, 1, sizeof *s);
+    if (!s) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+    s->photo_width = s->frame.width = desc->photo.width;
+    s->photo_height = s->frame.height = desc->photo.height;
+    status = txp_straight_search(desc, &scratch, env, s);
+    if (!s->found) {
+        s->frame.width = desc->photo.width;
+        s->frame.height = desc->photo.height;
+    }
+    txm_arena_free(&scratch);
+    if (status == TXM_OK && txm_progress(env, 1, "lattice"))
+        status = txm_fail(env, TXM_CANCELLED, "cancelled");
+    if (status != TXM_OK) {
+        txm_arena_free(&memory);
+        return status;
+    }
+    s->memory = memory;
+    *out = s;
+    return TXM_OK;
+}
+
+TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int *width,
+                                         int *height) {
+    if (width) *width = straight ? straight->frame.width : 0;
+    if (height) *height = straight ? straight->frame.height : 0;
+    return straight ? straight->found : 0;
+}
+
+TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straight) {
+    return straight && straight->found ? straight->clear : 0;
+}
+
+TEXPATCH_API int texpatch_straight_source(const texpatch_straight *straight, double x, double y,
+                                          double source[2]) {
+    double m[4];
+    if (!straight || !source || !txm_is_finite(x) || !txm_is_finite(y)) return 0;
+    source[0] = x;
+    source[1] = y;
+    if (!straight->found) return 1;
+    return txp_straight_at(&straight->frame, x, y, &source[0], &source[1], m);
+}
+
+TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight,
+                                               const txm_image *image, const texpatch_map *map,
+                                               txm_env *env, const txm_image *out) {
+    static const texpatch_map plain = {1, 0, 0, 0};
+    txp_rectifying q;
+    if (!straight || !image || !out)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "straight, image or out is NULL");
+    txm_status status = txp_check_picture(image, "image", env);
+    if (status == TXM_OK) status = txm_image_check(out, "out", TEXPATCH_MAX_PIXELS, env);
+    if (status != TXM_OK) return status;
+    const txm_image from = txm_image_resolve(*image), to = txm_image_resolve(*out);
+    if (from.width != straight->photo_width || from.height != straight->photo_height)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "must have the size of the photograph");
+    if (to.width != straight->frame.width || to.height != straight->frame.height ||
+        to.channels != from.channels || to.sample != from.sample)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "out",
+                           "must have the size that was found and the format of image");
+    q.kind = map ? *map : plain;
+    if (q.kind.is_normal && from.channels < 3)
+        return txm_fail_at(env, TXM_BAD_ARGUMENT, "image", "a normal map has 3 or 4 channels");
+    q.frame = &straight->frame;
+    q.image = &from;
+    q.out = &to;
+    const size_t row = (size_t)to.width * (size_t)to.channels * txm_sample_bytes(to.sample);
+    for (int y = 0; y < to.height && !straight->found; y++)
+        memcpy(txm_image_row(&to, y), txm_image_row_const(&from, y), row);
+    if (straight->found) txm_parallel_for(env, to.height, txp_rectify_row, &q);
+    return TXM_OK;
+}
+
+TEXPATCH_API void texpatch_straight_free(texpatch_straight *straight) {
+    if (!straight) return;
+    txm_arena memory = straight->memory;
+    txm_arena_free(&memory);
 }
 
 #endif /* TEXPATCH_IMPLEMENTATION */

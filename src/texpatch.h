@@ -45,6 +45,8 @@
      texpatch_begin ...   the same in steps, with a picture after each; texpatch_again synthesises
                           a part again, texpatch_source_at tells where each pixel comes from
      texpatch_plane_...   windows of an endless plane, which agree wherever they overlap
+     texpatch_straight_   a photograph of a wall or floor, seen at an angle, as from straight in
+                          front; what is synthesised from it keeps its courses
      texpatch_half        coarser levels of detail of a result
      texsyn.h makes stochastic texture from a model of a few kB instead of pieces of the photograph;
      textiles.h makes sets of tiles that are assembled when the picture is drawn.
@@ -65,12 +67,15 @@
      Alpha, the last of 2 or 4 channels of a map that is neither data nor normals, says how much of
      a pixel shows: colours are compared, averaged and bent weighted by it, and the colours of fully
      transparent pixels never matter; those of the result are the visible neighbours'.
+     A photograph is straightened before all that: the spectra of small windows are those of a few
+     waves on a plane; the tilt, the lens and the waves that explain all windows are searched for and
+     then fitted to the phases of the waves by least squares. Edges tell which way is up.
      A part that is synthesised again and a cell of the plane are the same kind of job, with some
      pixels given.
 
    LIMITS
-     Touching stones are sometimes merged; perspective is not corrected; a lattice whose rows are
-     not parallel (waves, fans) is not found. What is unique in the exemplar, such as a knot in
+     Touching stones are sometimes merged; perspective is corrected by
+     texpatch_straight_find alone; a lattice whose rows are not parallel (waves, fans) is not found. What is unique in the exemplar, such as a knot in
      wood, is repeated.
 
    CONFIGURATION   (define before the include that has _IMPLEMENTATION)
@@ -284,6 +289,9 @@ TEXPATCH_API txm_status texpatch_straight_find(const texpatch_straight_desc *des
    photograph is anywhere in it, but of at most twice its pixels. */
 TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int *width,
                                          int *height);
+
+/* How well the pattern agrees with a plane, 0 to 1; 0 if there is none or straight is NULL. */
+TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straight);
 
 /* Draw a picture in register with the photograph, straight; without a pattern: a copy.
 

@@ -21,6 +21,7 @@ extern const command composite_command;            /* composite.c */
 extern const command relight_command;              /* relight.c */
 extern const command erode_command;                /* erode.c   */
 extern const command patch_command;                /* patch.c  */
+extern const command straighten_command;           /* straighten.c */
 extern const command edges_command;                /* edges.c  */
 extern const command tiles_command;                /* tiles.c  */
 extern const command retile_command;               /* retile.c */

@@ -29,15 +29,16 @@ const char cli_versions[] =
 
 static const command *const commands[] = {
     &learn_command,     &synth_command,   &fill_command,  &knit_command,    &segment_command,
-    &composite_command, &relight_command, &erode_command, &patch_command,   &edges_command,
-    &tiles_command,     &retile_command,  &inpaint_command, &tree_command,  &forest_command};
+    &composite_command, &relight_command, &erode_command,   &straighten_command, &patch_command,
+    &edges_command,     &tiles_command,   &retile_command,  &inpaint_command,    &tree_command,
+    &forest_command};
 
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static int print_overview(void) {
     printf("texkit COMMAND [INPUT...] [options]\n\nCommands:\n");
     for (int i = 0; i < COMMAND_COUNT; i++)
-        printf("  %-10s %s\n", commands[i]->manual->name, commands[i]->manual->summary);
+        printf("  %-11s %s\n", commands[i]->manual->name, commands[i]->manual->summary);
     printf("\n'texkit help COMMAND', or 'texkit COMMAND --help', shows the options of one; 'texkit version'\n"
            "the versions of tool and headers. As a picture, model or mesh, - is standard input; -o - is\n"
            "standard output, -o jpg:- in that format; --stats - goes there too. A comma in a file's name is\n"

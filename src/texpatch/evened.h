@@ -16,7 +16,7 @@ enum {
     TXP_EVEN_PART = 8,  /* surroundings reach this part of the longer side ...               */
     TXP_EVEN_MOST = 64  /* ... but not more pixels than this                                 */
 };
-#define TXP_FAINT 0.3 /* of the mean deviation: fainter surroundings are not raised further  */
+#define TXP_EVEN_FAINT 0.3 /* of the mean deviation: fainter surroundings are not raised further  */
 
 /* A gray picture. */
 typedef struct txp_gray {
@@ -146,7 +146,7 @@ static int txp_even(const txp_gray *from, int reach, txm_arena *arena, txm_env *
         seen += (double)from->known[i];
     }
     txp_box_sums(square, from->width, from->height, reach, sums, copy);
-    const double faint = seen > 0 ? TXP_FAINT * sqrt(all / seen) : 0;
+    const double faint = seen > 0 ? TXP_EVEN_FAINT * sqrt(all / seen) : 0;
     for (size_t i = 0; i < count; i++) {
         const double mean = weight[i] > 1e-3f ? (double)square[i] / (double)weight[i] : 0;
         const double deviation = sqrt(mean > 0 ? mean : 0) + faint;

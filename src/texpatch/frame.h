@@ -14,7 +14,7 @@ enum {
     TXP_DIRECTIONS = 360, /* of edges: half a degree each                                        */
     TXP_BLURRED = 4,      /* of them to each side are one direction                              */
     TXP_BLURS = 2,        /* of 3 x 3 pixels before edges are looked for                         */
-    TXP_SNAP = 4,         /* an edge is along a wave within so many                              */
+    TXP_SNAP = 2,         /* an edge is along a wave within so many                              */
     TXP_SQUARE_LEAST = 2, /* the second axis is within so many of the normal of the first ...    */
     TXP_SQUARE_MOST = 40, /* ... or, in a tilted view, so many                                   */
     TXP_CELLS = 72,       /* cells along the sides of the plane when the frame is chosen         */
@@ -163,7 +163,7 @@ static void txp_find_axes(const txp_gray *g, const txp_guess *guess, double foca
     for (int i = 0; i < TXP_DIRECTIONS; i++) {
         /* who photographs a wall holds the camera nearly upright */
         const double off = fmin(fmin(i, TXP_DIRECTIONS - i), abs(i - TXP_DIRECTIONS / 2));
-        bins[i] *= 1 - TXP_UPRIGHT * off / (TXP_DIRECTIONS / 4);
+        bins[i] *= 1 - TXP_UPRIGHT * off / (0.25 * TXP_DIRECTIONS);
         mean += bins[i] / TXP_DIRECTIONS;
     }
     axes[0] = txp_edge_peak(bins, 0, TXP_DIRECTIONS / 2, &height);
@@ -178,7 +178,9 @@ static void txp_find_axes(const txp_gray *g, const txp_guess *guess, double foca
                   TXP_SQUARE_MOST);
     axes[1] = txp_edge_peak(bins, (int)normal, reach, &height);
     if (height < TXP_CLEAR_EDGES * mean) axes[1] = normal;
-    txp_wave_direction(guess, s, bins, TXP_SNAP, &axes[1]);
+    wave = normal;
+    if (txp_wave_direction(guess, s, bins, reach + TXP_SNAP, &wave) > TXP_WAVE_EDGES * height)
+        axes[1] = wave;
 }
 
 /* The frame whose axes these are: x is the one that is nearer to the rows of the photograph. */

@@ -74,8 +74,9 @@ static int txp_nodes_make(const txp_gray *gray, txm_arena *arena, txp_nodes *n) 
     n->sight = (txp_sight(*)[2])txm_arena_zero(arena, count, sizeof *n->sight);
     if (arena->failed) return 0;
     for (int i = 0; i < n->across * n->down; i++) {
-        n->at[i].x = ((i % n->across + 0.5) / n->across - 0.5) * w / n->half;
-        n->at[i].y = ((i / n->across + 0.5) / n->down - 0.5) * h / n->half;
+        const int column = i % n->across, row = i / n->across;
+        n->at[i].x = ((column + 0.5) / n->across - 0.5) * w / n->half;
+        n->at[i].y = ((row + 0.5) / n->down - 0.5) * h / n->half;
     }
     return 1;
 }

@@ -222,6 +222,10 @@ TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int 
     return straight ? straight->found : 0;
 }
 
+TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straight) {
+    return straight && straight->found ? straight->clear : 0;
+}
+
 TEXPATCH_API int texpatch_straight_source(const texpatch_straight *straight, double x, double y,
                                           double source[2]) {
     double m[4];

@@ -161,8 +161,8 @@ static inline double txp_spectrum_at(const txp_spectra *s, int i, double wx, dou
         kx = -kx;
         ky = -ky;
     }
-    kx += n / 2;
-    if (!(kx >= 0 && kx < n - 1.001 && ky < n / 2 - 0.001)) return 0;
+    kx += 0.5 * n;
+    if (!(kx >= 0 && kx < n - 1.001 && ky < 0.5 * n - 0.001)) return 0;
     const int x = (int)kx, y = (int)ky;
     const double u = kx - x, v = ky - y;
     const float *p = s->at + (size_t)i * txp_spectrum_size(n) + y * n + x;

@@ -77,6 +77,7 @@ static double txp_usual_curl(double bend) {
 
 static void txp_prepare(const txp_spectra *s, const txp_view *v, txp_prepared *p) {
     double place[2];
+    memset(p->good, 0, sizeof p->good);
     for (int i = 0; i < s->across * s->down; i++)
         p->good[i] = txp_view_place(v, s->middles[i].x, s->middles[i].y, place, p->m[i]);
 }

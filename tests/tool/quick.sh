@@ -55,6 +55,10 @@ check "erode" run 0 erode sand.png --weathered cells.png --level 0.5 -o eroded.p
 check "has the size and channels" check_tool patch is eroded.png 48 48 3 8
 refuses 2 "--weathered" erode sand.png -o n.png
 
+check "straighten" run 0 straighten bricks.png -o straight.png --stats stats.json
+check "has the size it says" check_tool patch is straight.png "$(figure width)" "$(figure height)" 3 8
+refuses 1 "No such file" straighten missing.png -o n.png
+
 check "patch" run 0 patch bricks.png -o patch.png --size 64x64 --passes 1
 check "has the size and channels" check_tool patch is patch.png 64 64 3 8
 refuses 1 "No such file" patch missing.png -o n.png --size 64x64

@@ -43,6 +43,8 @@ static const cli_manual patch_manual = {
     "--sources FILE.pfm says where each pixel comes from, in three floats: x and y in the\n"
     "  exemplar; and 8 times the exemplar's number (EXEMPLAR is 0), plus 4 if it is mirrored,\n"
     "  plus the number of counter-clockwise quarter turns, or -1 if the pixel was kept.\n"
+    "--straighten does with every exemplar what 'texkit straighten' does; --sources then counts\n"
+    "  pixels of the straight pictures.\n"
     "'continuous' of --stats is the share of neighbours in OUT that are neighbours in EXEMPLAR.\n",
     "  texkit patch bricks.jpg -o wall.png --size 2048x1024 --tileable --lod 4\n"
     "  texkit patch bricks.png -o wall.png --size 512x512 --normal 1 --data 2 \\\n"
@@ -156,6 +158,8 @@ static int run_job(patch_job *j, int argc, char **argv) {
         {CLI_INPUTS, "--mask", "M", "use EXEMPLAR only where this picture is not black; one for each",
          &j->masks, 0, 0},
         {CLI_INT, "--even", "R", EVEN_HELP, &j->even, 0, EVEN_MOST},
+        {CLI_FLAG, "--straighten", NULL,
+         "make EXEMPLAR straight first, a wall or floor seen at an angle", &j->straighten, 0, 0},
         {CLI_INT, "--patch", "N",
          "side of the first patches in pixels; default: chosen for EXEMPLAR", &d->patch, 8,
          TEXPATCH_MAX_SIDE},

@@ -7,7 +7,7 @@
 #define PATCH_H
 
 #include "command.h"
-#include "texpatch.h"
+#include "straighten.h"
 
 enum {
     MAX_NAMES = TEXPATCH_MAX_MAPS > TEXPATCH_MAX_EXEMPLARS ? TEXPATCH_MAX_MAPS
@@ -29,6 +29,7 @@ typedef struct patch_job {
     const char *map_list, *weights, *normals, *labels, *data, *more, *masks, *guides, *target;
     const char *target_mask, *guide_weight, *kept_list, *keep, *novelty, *lattice, *window;
     const char *sources, *control;
+    int straighten; /* photographs are made straight first */
     int extent[2], passes, directx, tileable, tileable_x, tileable_y, lod, cutout, even;
 
     texpatch_desc desc; /* filled in while options and files are read */

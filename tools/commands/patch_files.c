@@ -141,6 +141,34 @@ static int even_exemplar(patch_job *j, int e) {
     return status;
 }
 
+/* Every exemplar with its maps, mask and guide, from straight in front. */
+static int straighten_all(patch_job *j) {
+    static const texpatch_map label = {0, 0, 1, 0}, data = {0, 0, 0, 1};
+    int status = CLI_DONE;
+    for (int e = 0; e < j->desc.exemplar_count && !status; e++) {
+        texpatch_exemplar *x = &j->exemplars[e];
+        straight_picture pictures[TEXPATCH_MAX_MAPS + 2];
+        const txm_image mask = x->mask;
+        double agreement;
+        int count = 0;
+        for (; count < j->desc.map_count; count++) {
+            pictures[count].image = &j->pictures[e][count];
+            pictures[count].map = &j->maps[count];
+        }
+        if (x->mask.pixels) {
+            pictures[count].image = &x->mask;
+            pictures[count++].map = &label;
+        }
+        if (x->guide.pixels) {
+            pictures[count].image = &x->guide;
+            pictures[count++].map = &data;
+        }
+        status = straighten(&j->run, j->exemplar_names.at[e], pictures, count, &mask, 0,
+                            &agreement);
+    }
+    return status;
+}
+
 int patch_read_all(patch_job *j) {
     texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
@@ -152,6 +180,7 @@ int patch_read_all(patch_job *j) {
     }
     if (!status && j->masks) status = read_for_exemplars(j, "--mask", j->masks, 1);
     if (!status && j->guides) status = read_for_exemplars(j, "--guide", j->guides, 0);
+    if (!status && j->straighten) status = straighten_all(j);
     if (!status && j->target)
         status = read_sized(j, "the target", j->target, j->exemplars[0].guide.channels, TXM_U8,
                             &d->guide);

@@ -3,6 +3,7 @@
 #define _XOPEN_SOURCE 700 /* POSIX: open_memstream */
 #include "command.h"
 #include "files/image_io.h"
+#include "straighten.h"
 #include "textiles.h"
 
 #include <stdio.h>
@@ -246,19 +247,40 @@ static int take_photo(cli *run, photos *p, const char *path) {
     return CLI_DONE;
 }
 
+/* The file of exemplar e, for messages; names: what is left of --edges and --more. */
+static const char *name_photo(const cli *run, int e, const char *names[2], char path[MAX_PATH]) {
+    const char **list = names[0] ? &names[0] : &names[1];
+    if (e == 0) return run->inputs[0];
+    cli_take_name(list, ",", path);
+    return path;
+}
+
 /* Even the light of all photographs, but not of the maps. names: --edges and --more, for warnings. */
 static int even_photos(cli *run, photos *p, int even, const char *names[2]) {
     int status = CLI_DONE, used;
     char path[MAX_PATH];
     for (int e = 0; e < p->count && !status; e++) {
-        const char *name = run->inputs[0];
-        if (e > 0) {
-            const char **list = names[0] ? &names[0] : &names[1];
-            cli_take_name(list, ",", path);
-            name = path;
-        }
+        const char *name = name_photo(run, e, names, path);
         status = even_picture(run, name, even, NULL, &p->images[e][0], &used);
         if (e == 0) cli_figure(run, "even", used);
+    }
+    return status;
+}
+
+/* Every exemplar with its maps, from straight in front; data: bit m is set for maps that are data. */
+static int straighten_photos(cli *run, photos *p, unsigned data, const char *names[2]) {
+    static const texpatch_map quantity = {0, 0, 0, 1};
+    int status = CLI_DONE;
+    char path[MAX_PATH];
+    for (int e = 0; e < p->count && !status; e++) {
+        straight_picture pictures[TEXTILES_MAX_MAPS];
+        const char *name = name_photo(run, e, names, path);
+        double agreement;
+        for (int m = 0; m < p->exemplars[e].map_count; m++) {
+            pictures[m].image = &p->images[e][m];
+            pictures[m].map = data >> m & 1 ? &quantity : NULL;
+        }
+        status = straighten(run, name, pictures, p->exemplars[e].map_count, NULL, 0, &agreement);
     }
     return status;
 }
@@ -336,7 +358,7 @@ static int run_tiles(int argc, char **argv) {
     textiles_desc desc = {0};
     const char *kind = NULL, *packing = "packed", *repair = "poisson", *classes = NULL;
     const char *maps = NULL, *more = NULL, *edges = NULL, *data = NULL;
-    int even = EVEN_AUTO, gutter = -1, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
+    int even = EVEN_AUTO, gutter = -1, straight = 0, status, list[TEXTILES_MAX_CLASSES][4], edge_exemplars[TEXTILES_MAX_COLORS];
     const cli_option options[] = {
         {CLI_TEXT, "--kind", "KIND", "wang, corner, triangle or frame", &kind, 0, 0},
         {CLI_INT, "--colors", "C", "colors of the edges or corners, 2 to 4 (frame: 1 to 4); default 2",
@@ -357,6 +379,8 @@ static int run_tiles(int argc, char **argv) {
         {CLI_INPUTS, "--edges", "P0,P1,...", "pictures to cut the edges from, one for each color",
          &edges, 0, 0},
         {CLI_INT, "--even", "R", EVEN_HELP, &even, 0, EVEN_MOST},
+        {CLI_FLAG, "--straighten", NULL,
+         "make all exemplars straight first, as 'texkit straighten' does", &straight, 0, 0},
         {CLI_TEXT, "--packing", "HOW", "packed (with gutters), torus (Wei's layout) or slices",
          &packing, 0, 0},
         {CLI_INT, "--gutter", "G", "pixels around each tile, 2^n for n mip levels; default 8",
@@ -412,6 +436,10 @@ static int run_tiles(int argc, char **argv) {
     }
     if (!status && more)
         status = read_list(&run, more, "--more", MAX_PHOTOS - p.count, &p, take_photo);
+    if (!status && straight) {
+        cli_stage(&run, "straighten");
+        status = straighten_photos(&run, &p, desc.data_maps, (const char *[2]){edges, more});
+    }
     if (!status) status = even_photos(&run, &p, even, (const char *[2]){edges, more});
     if (status) goto done;
 

@@ -221,6 +221,33 @@ static uint64_t plane(txm_env *env) {
     return hash;
 }
 
+/* a wall seen from the side */
+static uint64_t straight(txm_env *env) {
+    enum { WALL = 160 };
+    static uint8_t photo[WALL * WALL], drawn[2 * WALL * WALL];
+    texpatch_straight_desc desc;
+    texpatch_straight *found;
+    int w, h;
+    for (int y = 0; y < WALL; y++) {
+        for (int x = 0; x < WALL; x++) {
+            /* rational numbers: the same bits everywhere */
+            const double depth = 1 + x / (4.0 * WALL);
+            const int u = (int)(2 * x / depth), v = (int)((2 * y - WALL + 0.2 * x) / depth) + 480;
+            const int shifted = u + v / 20 % 2 * 20;
+            const int shade = (int)(txm_hash((uint64_t)(v / 20 * 97 + shifted / 40)) % 48);
+            photo[y * WALL + x] = (uint8_t)(v % 20 < 4 || shifted % 40 < 4 ? 210 : 80 + shade);
+        }
+    }
+    memset(&desc, 0, sizeof desc);
+    desc.photo = golden_image(photo, WALL, WALL, 1, TXM_U8);
+    golden_need(texpatch_straight_find(&desc, env, &found), "find", env);
+    if (!texpatch_straight_found(found, &w, &h)) golden_need(TXM_BAD_DATA, "find", env);
+    const txm_image out = golden_image(drawn, w, h, 1, TXM_U8);
+    golden_need(texpatch_straight_draw(found, &desc.photo, NULL, env, &out), "draw", env);
+    texpatch_straight_free(found);
+    return tk_hash(0, drawn, (size_t)w * (size_t)h);
+}
+
 /* coarser levels of a picture, of a normal map and of labels */
 static uint64_t half(txm_env *env) {
     enum { ODD = 63, HALF = 31 };
@@ -249,5 +276,6 @@ static uint64_t half(txm_env *env) {
 static const golden_case cases[] = {
     {"tileable", tileable}, {"turned", turned}, {"lattice", lattice}, {"lattice-given", lattice_given},
     {"maps", maps},         {"guided", guided}, {"again", again},     {"plane", plane},
-    {"half", half}};
+    {"half", half},
+    {"straight", straight}};
 GOLDEN_MAIN("texpatch")
