@@ -4859,7 +4859,7 @@ static void txp_search_view(const txp_spectra *s, txm_env *env, txp_guess out[TX
     q.best = best;
     memset(list, 0, sizeof list);
     txm_parallel_for(env, COLUMNS, txp_try_column, &q);
-    for (int i = 0; i < COLUMNS * TXP_GUESSES; i++)
+    for (int i = 0; i < COLUMNS * (int)TXP_GUESSES; i++)
         txp_keep_guess(list, TXP_REFINED, &best[i / TXP_GUESSES][i % TXP_GUESSES]);
     climbers.spectra = s;
     climbers.list = list;
@@ -5367,7 +5367,7 @@ static void txp_edge_directions(const txp_gray *g, const txp_view *v, const doub
             turn -= floor(turn);
             /* squared once more, so that noise counts less than lines */
             const double strength = gx * gx + gy * gy;
-            sums[(int)(turn * TXP_DIRECTIONS) % TXP_DIRECTIONS] += strength * strength;
+            sums[(int)(turn * (int)TXP_DIRECTIONS) % TXP_DIRECTIONS] += strength * strength;
         }
     }
     for (int i = 0; i < TXP_DIRECTIONS; i++) {
@@ -5394,12 +5394,12 @@ static double txp_edge_peak(const double *bins, int middle, int reach, double *h
 /* The direction of a vector as a bin. */
 static double txp_direction_of(double x, double y) {
     const double turn = 2 * txp_turns(x, y);
-    return (turn - floor(turn)) * TXP_DIRECTIONS;
+    return (turn - floor(turn)) * (int)TXP_DIRECTIONS;
 }
 
 static double txp_bins_apart(double a, double b) {
     const double d = fabs(a - b);
-    return fmin(d, TXP_DIRECTIONS - d);
+    return fmin(d, (int)TXP_DIRECTIONS - d);
 }
 
 /* The plane's stretch by which distances become those of the wall: it was seen from the side. */
@@ -5449,18 +5449,18 @@ static void txp_find_axes(const txp_gray *g, const txp_guess *guess, double foca
     for (int i = 0; i < TXP_DIRECTIONS; i++) {
         /* who photographs a wall holds the camera nearly upright */
         const double off = fmin(fmin(i, TXP_DIRECTIONS - i), abs(i - TXP_DIRECTIONS / 2));
-        bins[i] *= 1 - TXP_UPRIGHT * off / (0.25 * TXP_DIRECTIONS);
-        mean += bins[i] / TXP_DIRECTIONS;
+        bins[i] *= 1 - TXP_UPRIGHT * off / (0.25 * (int)TXP_DIRECTIONS);
+        mean += bins[i] / (int)TXP_DIRECTIONS;
     }
     axes[0] = txp_edge_peak(bins, 0, TXP_DIRECTIONS / 2, &height);
     double wave = axes[0];
     const double edges = txp_wave_direction(guess, s, bins, TXP_DIRECTIONS, &wave);
     if (edges > TXP_WAVE_EDGES * height || height < TXP_CLEAR_EDGES * mean) axes[0] = wave;
     /* the focal length is a guess: in a tilted view the other axis need not be the normal */
-    double normal = axes[0] + 0.5 * TXP_DIRECTIONS;
-    if (normal >= TXP_DIRECTIONS) normal -= TXP_DIRECTIONS;
+    double normal = axes[0] + 0.5 * (int)TXP_DIRECTIONS;
+    if (normal >= (int)TXP_DIRECTIONS) normal -= (int)TXP_DIRECTIONS;
     const int reach =
-        (int)fmin(TXP_SQUARE_LEAST + TXP_SQUARE_TILTED * (longer / shorter - 1),
+        (int)fmin((int)TXP_SQUARE_LEAST + TXP_SQUARE_TILTED * (longer / shorter - 1),
                   TXP_SQUARE_MOST);
     axes[1] = txp_edge_peak(bins, (int)normal, reach, &height);
     if (height < TXP_CLEAR_EDGES * mean) axes[1] = normal;
@@ -5474,7 +5474,7 @@ static void txp_set_axes(const double s[4], const double axes[2], txp_frame *f) 
     double rows[2][2];
     for (int k = 0; k < 2; k++) {
         double sine, cosine;
-        txm_sincos(TXM_PI * axes[k] / TXP_DIRECTIONS, &sine, &cosine);
+        txm_sincos(TXM_PI * axes[k] / (int)TXP_DIRECTIONS, &sine, &cosine);
         rows[k][0] = cosine * s[0] + sine * s[2];
         rows[k][1] = cosine * s[1] + sine * s[3];
     }
@@ -5547,8 +5547,8 @@ static void txp_frame_box(const txp_frame *f, double reach_x, double reach_y, do
     for (int i = 0; i <= STEPS; i++) {
         for (int j = 0; j <= STEPS; j++) {
             double place[2], m[4];
-            if (!txp_view_place(&f->view, (2.0 * i / STEPS - 1) * reach_x,
-                                (2.0 * j / STEPS - 1) * reach_y, place, m))
+            if (!txp_view_place(&f->view, (2.0 * i / (int)STEPS - 1) * reach_x,
+                                (2.0 * j / (int)STEPS - 1) * reach_y, place, m))
                 continue;
             /* what is too far away to be seen well is cut off */
             const double size = m[0] * m[3] - m[1] * m[2];
@@ -5571,8 +5571,8 @@ static int txp_frame_rectangle(const txp_frame *f, double reach_x, double reach_
     for (int y = 0; y < TXP_CELLS; y++) {
         for (int x = 0; x < TXP_CELLS; x++) {
             double px = 0, py = 0, m[4] = {0, 0, 0, 0};
-            const double fx = box[0] + (box[2] - box[0]) * (x + 0.5) / TXP_CELLS;
-            const double fy = box[1] + (box[3] - box[1]) * (y + 0.5) / TXP_CELLS;
+            const double fx = box[0] + (box[2] - box[0]) * (x + 0.5) / (int)TXP_CELLS;
+            const double fy = box[1] + (box[3] - box[1]) * (y + 0.5) / (int)TXP_CELLS;
             const int is_in = txp_frame_place(f, fx, fy, &px, &py, m) && fabs(px) <= reach_x &&
                               fabs(py) <= reach_y;
             const double size = is_in ? fabs(m[0] * m[3] - m[1] * m[2]) : 0;
@@ -5620,7 +5620,7 @@ static int txp_frame_choose(txp_frame *f, int width, int height, txp_survey *c) 
         return 0;
     for (int y = best[1]; y < best[3]; y++)
         for (int x = best[0]; x < best[2]; x++) finest = fmax(finest, c->scale[y][x]);
-    const double step_x = (box[2] - box[0]) / TXP_CELLS, step_y = (box[3] - box[1]) / TXP_CELLS;
+    const double step_x = (box[2] - box[0]) / (int)TXP_CELLS, step_y = (box[3] - box[1]) / (int)TXP_CELLS;
     /* middles of the outermost cells are inside for certain */
     const double w = (best[2] - best[0] - 1) * step_x, h = (best[3] - best[1] - 1) * step_y;
     f->left = box[0] + (best[0] + 0.5) * step_x;
@@ -5765,7 +5765,7 @@ static void txp_rectify_row(void *context, int y) {
             const double high = sqrt(m[1] * m[1] + m[3] * m[3]), most = fmax(wide, high);
             samples = most < TXP_SHRINKING ? 1 : txm_clampi((int)ceil(most), 1, TXP_MOST_SAMPLES);
         }
-        const double t = (double)part / TXP_STRIDE;
+        const double t = (double)part / (int)TXP_STRIDE;
         txp_rectify_pixel(q, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, m, samples, v);
         for (int c = 0; c < out->channels; c++) txm_image_set(out, x, y, c, v[c]);
     }

@@ -136,7 +136,7 @@ static void txp_rectify_row(void *context, int y) {
             const double high = sqrt(m[1] * m[1] + m[3] * m[3]), most = fmax(wide, high);
             samples = most < TXP_SHRINKING ? 1 : txm_clampi((int)ceil(most), 1, TXP_MOST_SAMPLES);
         }
-        const double t = (double)part / TXP_STRIDE;
+        const double t = (double)part / (int)TXP_STRIDE;
         txp_rectify_pixel(q, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, m, samples, v);
         for (int c = 0; c < out->channels; c++) txm_image_set(out, x, y, c, v[c]);
     }

@@ -266,7 +266,7 @@ static void txp_search_view(const txp_spectra *s, txm_env *env, txp_guess out[TX
     q.best = best;
     memset(list, 0, sizeof list);
     txm_parallel_for(env, COLUMNS, txp_try_column, &q);
-    for (int i = 0; i < COLUMNS * TXP_GUESSES; i++)
+    for (int i = 0; i < COLUMNS * (int)TXP_GUESSES; i++)
         txp_keep_guess(list, TXP_REFINED, &best[i / TXP_GUESSES][i % TXP_GUESSES]);
     climbers.spectra = s;
     climbers.list = list;
