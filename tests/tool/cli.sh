@@ -402,6 +402,8 @@ check "maps keep their channels" \
 check "--maps of the same picture" run 0 tiles cells.png -o twin --kind triangle --size 32 \
     --maps cells.png
 check "is cut in register" cmp twin/atlas.png twin/atlas-2.png
+check "--data" run 0 tiles cells.png -o data --kind wang --size 32 --maps clouds.png --data 1
+for bad in x 1.5 -1 8 1,; do refuses 2 "--data" tiles cells.png -o n --kind wang --size 32 --data $bad; done
 check "--more" run 0 tiles cells.png -o more --kind wang --size 32 --more other.png,clouds.png
 check "--edges" run 0 tiles cells.png -o edges --kind wang --size 32 --edges cells.png,clouds.png
 check "the set with chosen edges is whole" $check_tiles edges

@@ -211,6 +211,7 @@ static void test_import_round_trip(void **state) {
         }
         textiles_desc d = desc_of((textiles_kind)k, NULL, 77, n);
         d.variants = k == TEXTILES_CORNER ? 2 : 0;
+        d.data_maps = 1 << 1; /* its second channel hides nothing */
         if (k == TEXTILES_FRAME) d.colors = 3;
         textiles_set *set = NULL;
         tk_memory memory = {0};

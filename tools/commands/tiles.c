@@ -28,8 +28,9 @@ static const cli_manual tiles_manual = {
     "edges of a tile are unchanged pixels of EXEMPLAR on both sides of the joint. A side of\n"
     "EXEMPLAR should be at least three times that of a tile.\n"
     "Maps of the same material (normals, roughness) are cut in register with --maps:\n"
-    "atlas-2.png holds the first of them, and so on; of RGBA maps in --data A is no alpha. Uneven light of EXEMPLAR and of --more and\n"
-    "--edges, not that of maps, is evened out, with a warning, if it would show; see --even.\n",
+    "atlas-2.png holds the first of them, and so on. The alpha of a map says how much of its colors\n"
+    "shows, unless --data names it. Uneven light of EXEMPLAR and of --more and --edges, not that of\n"
+    "maps, is evened out, with a warning, if it would show; see --even.\n",
     "  texkit tiles gravel.jpg -o gravel-tiles --kind wang\n"
     "  texkit tiles bark.png -o bark --kind frame --classes '0,0,0,0;0,1,0,0' --variants 4\n",
     1, "exemplar", 1, "make smaller tiles", NULL};
