@@ -176,10 +176,10 @@ PATHS  = '--checks=-bugprone-*,-performance-*,-portability-*'
 
 lint:
 	@tools/setup.sh lint
-	$(CPPCHECK) $(BARE) -D_OPENMP=201511 -DFOREST_WINDOW $(LINTED)
+	$(CPPCHECK) $(BARE) $(FORMATS) -D_OPENMP=201511 -DFOREST_WINDOW $(LINTED)
 	$(CPPCHECK) -D__GNUC__ -D__x86_64__ -D__SSE2__ $(IMPLEMENTED)
 	$(CPPCHECK) -D__GNUC__ -D__aarch64__ $(IMPLEMENTED)
-	printf '%s\n' $(LINTED) $(IMPLEMENTED) | $(call TIDY,,-Itools $(BARE))
+	printf '%s\n' $(LINTED) $(IMPLEMENTED) | $(call TIDY,,-Itools $(FORMATS) $(BARE))
 	ls src/*.h | $(call TIDY,$(SYNTAX),-xc $(MACROS:%=-D%_IMPLEMENTATION) -Wno-unused-function)
 	ls -S $(PARTS) | $(call TIDY,$(PATHS),-xc -Wno-unused-function)
 

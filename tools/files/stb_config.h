@@ -1,4 +1,5 @@
-/* stb_config.h - the stb libraries with the formats that we read, and no others
+/* stb_config.h - the stb libraries with the formats that the examples read, and no others. The tool writes
+   TGA and BMP by them; image_io.h reads all pictures
    SPDX-License-Identifier: MIT OR Unlicense */
 #ifndef STB_CONFIG_H
 #define STB_CONFIG_H
@@ -11,9 +12,5 @@
 
 #include <stb/stb_image.h>
 #include <stb/stb_image_write.h>
-
-/* public, but declared nowhere */
-STBIWDEF unsigned char *stbi_zlib_compress(unsigned char *data, int data_len, int *out_len,
-                                           int quality);
 
 #endif /* STB_CONFIG_H */
