@@ -319,6 +319,7 @@ static readback common[KINDS][2];
 static inline textiles_desc common_desc(int kind) {
     textiles_desc d = desc_of((textiles_kind)kind, &common_exemplar, 1, SIZE);
     d.seed = 5;
+    d.data_maps = 1 << 1; /* four quantities, none of them alpha */
     if (kind == TEXTILES_FRAME) {
         d.colors = 3;
         d.classes = common_classes;

@@ -211,6 +211,7 @@ static void test_triangle_values(void **state) {
     textiles_desc d = desc_of(TEXTILES_TRIANGLE, &exemplar, 1, 33);
     d.reduced = 1;
     d.repair = TEXTILES_REPAIR_NONE;
+    d.data_maps = 1 << 1;
     textiles_set *set = make(&d);
     readback b = read_back(set, 1 | 4 << 8);
     check_sources(&b, sizes);
