@@ -1,6 +1,7 @@
-/* stb_config.h - the stb libraries with the formats that the examples read, and no others. The tool writes
-   TGA and BMP by them; image_io.h reads all pictures
-   SPDX-License-Identifier: MIT OR Unlicense */
+/* stb_config.h - the stb libraries with the formats that the examples read, and no others
+   SPDX-License-Identifier: MIT OR Unlicense
+
+   The tool writes TGA and BMP by them; image_io.h reads all pictures.                           */
 #ifndef STB_CONFIG_H
 #define STB_CONFIG_H
 
