@@ -18,7 +18,8 @@ enum {
     TXS_LONG_LAST = 12,  /* ... and from the full share on                                   */
     TXS_LONG_STEPS = 10, /* times at which the demand falls                                  */
     TXS_LONG_PART = 4,   /* and it is at most this part of the shorter side of the picture   */
-    TXS_STRENGTHS = 4096 /* steps into which the range of strengths is divided               */
+    TXS_STRENGTHS = 4096, /* steps into which the range of strengths is divided              */
+    TXS_ORDER_REPORT = 1 << 17 /* pixels between reports of progress, some hundredths of a second */
 };
 #define TXS_GO_ON 1.0f /* by how much a pixel beside an eroded one counts as stronger          */
 
@@ -59,13 +60,14 @@ static uint32_t txs_take(txs_queue *q) {
     }
 }
 
-/* Take all pixels; the values of order are these. */
-static void txs_grow_cracks(txs_queue *q, uint32_t count, txm_pair *order) {
+/* Take all pixels; the values of order are these. 0: cancelled. */
+static int txs_grow_cracks(txs_queue *q, uint32_t count, txm_pair *order, txm_env *env, float at) {
     memset(q->state, 0, count);
     memset(q->first, 0xff, TXS_STRENGTHS * sizeof *q->first);
     q->step = 0;
     for (uint32_t i = count; i-- > 0;) txs_enter(q, i, 0); /* of equal ones the first comes first */
     for (uint32_t k = 0; k < count; k++) {
+        if (k % TXS_ORDER_REPORT == 0 && txm_progress(env, at, "order")) return 0;
         const uint32_t p = txs_take(q);
         const int x = (int)(p % (uint32_t)q->width), y = (int)(p / (uint32_t)q->width);
         order[k].value = p;
@@ -78,6 +80,7 @@ static void txs_grow_cracks(txs_queue *q, uint32_t count, txm_pair *order) {
             }
         }
     }
+    return 1;
 }
 
 /* Regions of pixels that have been reached, as trees with their root as the name. Pixels of a
@@ -166,13 +169,14 @@ static int txs_demand(const txs_regions *r, int step) {
     return length < side / TXS_LONG_PART ? length : side / TXS_LONG_PART;
 }
 
-/* Reach all pixels in order and note when each is released. */
-static void txs_reach_all(txs_regions *r, uint32_t count, double share) {
+/* Reach all pixels in order and note when each is released. 0: cancelled. */
+static int txs_reach_all(txs_regions *r, uint32_t count, double share, txm_env *env, float at) {
     const double span = share * (double)count / (double)TXS_LONG_STEPS;
     int step = 0, demand = txs_demand(r, 0);
     memset(r->parent, 0xff, (size_t)count * sizeof *r->parent);
     for (uint32_t k = 0; k < count; k++) r->place[r->order[k].value] = k;
     for (uint32_t k = 0; k < count; k++) {
+        if (k % TXS_ORDER_REPORT == 0 && txm_progress(env, at, "order")) return 0;
         if (step < TXS_LONG_STEPS && (double)k >= span * (step + 1)) { /* the demand falls */
             demand = txs_demand(r, ++step);
             for (uint32_t i = 0; i < k; i++) {
@@ -189,6 +193,7 @@ static void txs_reach_all(txs_regions *r, uint32_t count, double share) {
         if (txs_region_waits(r, root) && txs_region_length(r, root) >= demand)
             txs_release(r, root, k);
     }
+    return 1;
 }
 
 /* rank receives for each pixel how many erode before it; memory for the work is taken from arena. */
@@ -208,12 +213,12 @@ static txm_status txs_find_ranks(const float *strength, int width, int height, d
     r.place = (uint32_t *)txm_arena_alloc(arena, n, sizeof(uint32_t));
     r.box = (int32_t *)txm_arena_alloc(arena, n, 4 * sizeof(int32_t));
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the order of erosion");
-    if (txm_progress(env, at, "order")) return txm_fail(env, TXM_CANCELLED, "cancelled");
     q.width = width;
     q.height = height;
     q.strength = strength;
-    txs_grow_cracks(&q, (uint32_t)n, r.order);
-    txs_reach_all(&r, (uint32_t)n, share);
+    if (!txs_grow_cracks(&q, (uint32_t)n, r.order, env, at) ||
+        !txs_reach_all(&r, (uint32_t)n, share, env, at))
+        return txm_fail(env, TXM_CANCELLED, "cancelled");
     txm_sort_pairs(r.order, r.order + n, n); /* stable: pixels of a region stay in order */
     for (size_t k = 0; k < n; k++) rank[r.order[k].value] = (uint32_t)k;
     return TXM_OK;
