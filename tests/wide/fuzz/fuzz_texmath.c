@@ -74,7 +74,7 @@ static void even(pool *p, source *s) {
     if (t.memory.blocks) abort();
 }
 
-/* Two pictures that differ in hidden colour alone become one. */
+/* What shows stays; two pictures that differ in hidden colour alone become one. */
 static void bleed(pool *p, source *s) {
     const int width = 1 + pick(s, MOST_SIDE), height = 1 + pick(s, MOST_SIDE), channels = 1 + pick(s, 4);
     const int wrap = pick(s, 4);
@@ -93,6 +93,11 @@ static void bleed(pool *p, source *s) {
     if (succeeded(txm_image_bleed(&a, wrap, &env), &t, &env)) {
         fuzz_succeeded++;
         if (!is_padding_fresh(&a)) abort();
+        for (int i = 0; is_finite && i < width * height * channels; i++) { /* what shows is as it was */
+            const int x = i / channels % width, y = i / channels / width, c = i % channels;
+            if (alpha >= 0 && c < alpha && !(txm_image_get(&b, x, y, alpha) > 0)) continue;
+            if (!(txm_image_get(&a, x, y, c) == txm_image_get(&b, x, y, c))) abort();
+        }
         if (succeeded(txm_image_bleed(&b, wrap, &env), &t, &env) && is_finite)
             for (int y = 0; y < height; y++)
                 for (int i = 0; i < width * channels; i++) {
