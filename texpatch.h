@@ -5278,7 +5278,7 @@ static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *en
         const int least = g->width < g->height ? g->width : g->height;
         for (int side = TXP_WINDOW_SIDE; side >= TXP_WINDOW_SIDE / 4; side /= 2) {
             /* small windows only where large ones would be too few */
-            if (least < side || (side < TXP_WINDOW_SIDE && least >= 4 * side)) continue;
+            if (least < side || (side < TXP_WINDOW_SIDE && least > 4 * side)) continue;
             if (found->guess.score >= TXP_CONVINCING) return TXM_OK;
             if (txm_progress(env, 0.5f * (float)(count - at) / (float)(count + 1), "lattice"))
                 return txm_fail(env, TXM_CANCELLED, "cancelled");
