@@ -219,10 +219,13 @@ stopped() { # SECONDS SIGNAL ARGUMENTS...
     wait $child
     got=$?
     took=$((($(date +%s%N) - from) / 1000000))
-    [ $got = 1 ] || { echo "status $got"; cat err.log; return 1; }
-    [ "$(wc -l <err.log)" = 1 ] && says "stopped; nothing was written" || { cat err.log; return 1; }
+    if [ $got = 1 ]; then
+        [ "$(wc -l <err.log)" = 1 ] && says "stopped; nothing was written" || { cat err.log; return 1; }
+    else # on a busy machine it may not have begun
+        [ $got -gt 128 ] && [ ! -s err.log ] || { echo "status $got"; cat err.log; return 1; }
+    fi
     [ "$before" = "$(all_files)" ] || { echo "files were made or changed"; ls -lA; return 1; }
-    [ $took -lt 1000 ] || { echo "it took $took ms"; return 1; } # 2 if nothing else runs
+    [ $took -lt 2000 ] || { echo "it took $took ms"; return 1; } # 2 if nothing else runs
 }
 for pause in 0.05 0.3 0.7; do
     for signal in INT TERM; do
