@@ -369,7 +369,7 @@ recur." ;;
         good:good:$stones) note= ;;
         limit:limit:*/grass) note="The blades keep their length." ;;
         limit:limit:*/brick) note="The wall is seen at an angle, so no two bricks of the photograph are equally
-wide. Where bricks of different width meet, mortar joints end." ;;
+wide. Where bricks of different width meet, mortar joints end. Below it is made straight first." ;;
         *) continue ;;
         esac
         laid "$sample" "$title" "$source" "$licence" "$note"
@@ -377,6 +377,25 @@ wide. Where bricks of different width meet, mortar joints end." ;;
     done <"$build/samples/list.txt"
 done
 [ -n "$wall" ] || wall=$stones
+
+if [ -e "$out/brick-laid.png" ]; then
+    "$build/texkit" straighten "$out/brick.png" -o "$out/brick-straight.png" --quiet
+    "$build/texkit" patch "$out/brick.png" -o "$out/brick-straight-laid.png" --size 512x512 \
+        --straighten --quiet
+    echo 'demo: brick    straight, then patched'
+    cat >>"$out/index.part" <<'STRAIGHT'
+<h3>Straight first</h3>
+<section class="pair">
+<div>
+<img src="brick.png" alt="bricks, as photographed">
+<img src="brick-straight.png" alt="bricks, as from straight in front">
+<p>The same bricks as photographed, and as from straight in front (<code>texkit straighten</code>); on the right
+what <code>texkit patch --straighten</code> makes of them: courses stay whole.</p>
+</div>
+<img src="brick-straight-laid.png" width="512" height="512" alt="texture from straightened bricks">
+</section>
+STRAIGHT
+fi
 
 "$build/texkit" patch "$out/$wall.png" -o "$out/$wall-laid-tile.png" --size 384x384 --tileable --quiet
 cat >"$out/strokes.json" <<'STROKES'
