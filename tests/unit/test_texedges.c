@@ -369,10 +369,10 @@ static void test_formats(void **state) {
             for (int i = 0; i < W * H; i++) {
                 for (int c = 0; c < channels; c++) {
                     const int alpha = channels % 2 == 0 && c == channels - 1;
-                    const int v = alpha ? (int)txm_rng_below(&rng, 256) : plain[i];
+                    const int v = alpha ? txm_rng_range(&rng, 1, 255) : plain[i];
                     bytes[i / W * (W + 3) * channels + i % W * channels + c] = (uint8_t)v;
                     words[i * channels + c] = (uint16_t)(257 * v);
-                    floats[i * channels + c] = alpha ? NAN : (float)v / 255.0f;
+                    floats[i * channels + c] = (float)v / 255.0f;
                 }
             }
             const txm_sample kind = sample == 0 ? TXM_U8 : sample == 1 ? TXM_U16 : TXM_F32;
@@ -386,6 +386,23 @@ static void test_formats(void **state) {
             assert_memory_equal(other->lines, e->lines, e->line_count * sizeof *e->lines);
             texedges_set_free(other);
         }
+    }
+    texedges_set_free(e);
+
+    /* where alpha is 0 any colour may be: the neighbours' is taken */
+    for (int hidden = 0; hidden < 2; hidden++) {
+        for (int i = 0; i < W * H; i++) {
+            const int shows = i % W / 9 % 2 || i / W / 7 % 2;
+            words[2 * i] = (uint16_t)(shows ? 257 * plain[i] : 65535 * hidden);
+            words[2 * i + 1] = (uint16_t)(shows ? 65535 : 0);
+        }
+        d.image = view(words, W, H, 2, TXM_U16);
+        texedges_set *other = find(&d);
+        if (hidden) {
+            assert_int_equal(other->point_count, e->point_count);
+            assert_memory_equal(other->points, e->points, e->point_count * sizeof *e->points);
+            texedges_set_free(other);
+        } else e = other;
     }
     texedges_set_free(e);
 
