@@ -141,7 +141,7 @@ enum {
     TEXPATCH_MAX_EXEMPLARS = 8,
     TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
     TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
-    TEXPATCH_MAX_SIDE = 8192    /* of an exemplar; the sum of their heights (with turns: of
+    TEXPATCH_MAX_SIDE = 16384   /* of an exemplar; the sum of their heights (with turns: of
                                    their larger sides, times turns) may be 32767             */
 };
 
@@ -1210,6 +1210,10 @@ static void txp_find_contrast(txp_source *s) {
     s->contrast = (double)sum / 4096;
 }
 
+enum { TXP_LATTICE_SIDE = 300 }; /* pixels: of a larger coarsest level only the middle is correlated, as
+                                   time grows with the fourth power of this. It is larger only if the
+                                   output is so small that no longer lattice fits                 */
+
 /* Find the lattice at the coarsest level, unless the caller gives it, and set it for all levels. */
 static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
     txm_arena scratch;
@@ -1225,6 +1229,11 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         txm_arena_init(&scratch, env);
         k.width = t->wide[0];
         k.height = t->high[0];
+        if ((double)k.width * k.height > (double)TXP_LATTICE_SIDE * (int)TXP_LATTICE_SIDE) {
+            k.width = k.width < TXP_LATTICE_SIDE ? k.width : TXP_LATTICE_SIDE;
+            k.height = k.height < TXP_LATTICE_SIDE ? k.height : TXP_LATTICE_SIDE;
+        }
+        const int left = (t->wide[0] - k.width) / 2, upper = (t->high[0] - k.height) / 2;
         k.reach_x = k.width * 5 / 8;
         k.reach_y = k.height * 5 / 8;
         int16_t *gray =
@@ -1237,7 +1246,7 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         }
         for (int y = 0; y < k.height; y++) {
             for (int x = 0; x < k.width; x++) {
-                const uint8_t *p = txp_stack_at(s, t, x, y);
+                const uint8_t *p = txp_stack_at(s, t, left + x, upper + y);
                 int sum = p[0], n = 1; /* one map at least has a weight */
                 for (; n < s->guide_at && n < 3; n++) sum += p[n];
                 gray[y * k.width + x] = (int16_t)(sum / n - 128);
@@ -1444,7 +1453,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     if (d->turns != 0 && d->turns != 1 && d->turns != 2 && d->turns != 4)
         return txm_fail(env, TXM_BAD_ARGUMENT, "turns must be 1, 2 or 4 (0 means 1)");
     if (d->patch < 0 || d->patch > TEXPATCH_MAX_SIDE)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 8192 pixels");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 16384 pixels");
     if (d->passes < -1 || d->passes > 16)
         return txm_fail(env, TXM_BAD_ARGUMENT, "passes must be 1 to 16, 0 for 3, or -1 for none");
     if (!txp_is_within(d->novelty, 0, 1))
@@ -1468,7 +1477,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         if (!txm_is_finite((double)d->lattice_vectors[i]))
             return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be finite");
         if (fabs((double)d->lattice_vectors[i]) > (double)TEXPATCH_MAX_SIDE)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 8192 pixels at most");
+            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 16384 pixels at most");
         u->lattice_vectors[i] = (double)d->lattice_vectors[i];
     }
     if (d->lattice == 1 && !(fabs(txp_det(u->lattice_vectors, u->lattice_vectors + 2)) >= 16))
@@ -1504,7 +1513,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         if (w < TEXPATCH_MIN_SIDE || h < TEXPATCH_MIN_SIDE)
             return txm_fail(env, TXM_TOO_SMALL, "an exemplar must be 32 x 32 pixels or more");
         if (w > TEXPATCH_MAX_SIDE || h > TEXPATCH_MAX_SIDE)
-            return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 8192 x 8192 pixels at most");
+            return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 16384 x 16384 pixels at most");
         rows += (u->turns > 2 ? (w > h ? w : h) : h) * u->turns * (u->mirror ? 2 : 1);
         if ((x->guide.pixels != NULL) != (d->exemplars[0].guide.pixels != NULL))
             return txm_fail(env, TXM_BAD_ARGUMENT, "give all exemplars a guide, or none");

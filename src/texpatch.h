@@ -141,7 +141,7 @@ enum {
     TEXPATCH_MAX_EXEMPLARS = 8,
     TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
     TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
-    TEXPATCH_MAX_SIDE = 8192    /* of an exemplar; the sum of their heights (with turns: of
+    TEXPATCH_MAX_SIDE = 16384   /* of an exemplar; the sum of their heights (with turns: of
                                    their larger sides, times turns) may be 32767             */
 };
 

@@ -110,7 +110,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     if (d->turns != 0 && d->turns != 1 && d->turns != 2 && d->turns != 4)
         return txm_fail(env, TXM_BAD_ARGUMENT, "turns must be 1, 2 or 4 (0 means 1)");
     if (d->patch < 0 || d->patch > TEXPATCH_MAX_SIDE)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 8192 pixels");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "patch must be 0 to 16384 pixels");
     if (d->passes < -1 || d->passes > 16)
         return txm_fail(env, TXM_BAD_ARGUMENT, "passes must be 1 to 16, 0 for 3, or -1 for none");
     if (!txp_is_within(d->novelty, 0, 1))
@@ -134,7 +134,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         if (!txm_is_finite((double)d->lattice_vectors[i]))
             return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be finite");
         if (fabs((double)d->lattice_vectors[i]) > (double)TEXPATCH_MAX_SIDE)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 8192 pixels at most");
+            return txm_fail(env, TXM_BAD_ARGUMENT, "lattice_vectors must be 16384 pixels at most");
         u->lattice_vectors[i] = (double)d->lattice_vectors[i];
     }
     if (d->lattice == 1 && !(fabs(txp_det(u->lattice_vectors, u->lattice_vectors + 2)) >= 16))
@@ -170,7 +170,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         if (w < TEXPATCH_MIN_SIDE || h < TEXPATCH_MIN_SIDE)
             return txm_fail(env, TXM_TOO_SMALL, "an exemplar must be 32 x 32 pixels or more");
         if (w > TEXPATCH_MAX_SIDE || h > TEXPATCH_MAX_SIDE)
-            return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 8192 x 8192 pixels at most");
+            return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 16384 x 16384 pixels at most");
         rows += (u->turns > 2 ? (w > h ? w : h) : h) * u->turns * (u->mirror ? 2 : 1);
         if ((x->guide.pixels != NULL) != (d->exemplars[0].guide.pixels != NULL))
             return txm_fail(env, TXM_BAD_ARGUMENT, "give all exemplars a guide, or none");

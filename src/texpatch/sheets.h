@@ -388,6 +388,10 @@ static void txp_find_contrast(txp_source *s) {
     s->contrast = (double)sum / 4096;
 }
 
+enum { TXP_LATTICE_SIDE = 300 }; /* pixels: of a larger coarsest level only the middle is correlated, as
+                                   time grows with the fourth power of this. It is larger only if the
+                                   output is so small that no longer lattice fits                 */
+
 /* Find the lattice at the coarsest level, unless the caller gives it, and set it for all levels. */
 static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
     txm_arena scratch;
@@ -403,6 +407,11 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         txm_arena_init(&scratch, env);
         k.width = t->wide[0];
         k.height = t->high[0];
+        if ((double)k.width * k.height > (double)TXP_LATTICE_SIDE * (int)TXP_LATTICE_SIDE) {
+            k.width = k.width < TXP_LATTICE_SIDE ? k.width : TXP_LATTICE_SIDE;
+            k.height = k.height < TXP_LATTICE_SIDE ? k.height : TXP_LATTICE_SIDE;
+        }
+        const int left = (t->wide[0] - k.width) / 2, upper = (t->high[0] - k.height) / 2;
         k.reach_x = k.width * 5 / 8;
         k.reach_y = k.height * 5 / 8;
         int16_t *gray =
@@ -415,7 +424,7 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
         }
         for (int y = 0; y < k.height; y++) {
             for (int x = 0; x < k.width; x++) {
-                const uint8_t *p = txp_stack_at(s, t, x, y);
+                const uint8_t *p = txp_stack_at(s, t, left + x, upper + y);
                 int sum = p[0], n = 1; /* one map at least has a weight */
                 for (; n < s->guide_at && n < 3; n++) sum += p[n];
                 gray[y * k.width + x] = (int16_t)(sum / n - 128);

@@ -330,7 +330,7 @@ static void test_novelty(void **state) {
 
 static void test_passes(void **state) {
     (void)state;
-    static const int passes[4] = {-1, 1, 4, 16}, patches[5] = {1, 8, 16, 28, 8192};
+    static const int passes[4] = {-1, 1, 4, 16}, patches[5] = {1, 8, 16, 28, 16384};
     const txm_image gravel = draw_gravel(48, 44, 3, 0);
     const txm_image least = draw_gravel(40, 36, 3, 0);
     const texpatch_exemplar e = exemplar_of(&gravel), f = exemplar_of(&least);

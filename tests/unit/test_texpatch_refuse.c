@@ -84,7 +84,7 @@ static void test_refuses(void **state) {
     REFUSE_EACH(desc.height, int, TXM_BAD_ARGUMENT, 0, 0, -1, INT_MIN);
     REFUSE_EACH(desc.width, int, TXM_TOO_LARGE, 0, INT_MAX, TEXPATCH_MAX_PIXELS / 40 + 1);
     REFUSE_EACH(desc.tileable, int, TXM_BAD_ARGUMENT, 0, -1, 4, INT_MAX);
-    REFUSE_EACH(desc.patch, int, TXM_BAD_ARGUMENT, 1, -1, 8193, INT_MAX, INT_MIN);
+    REFUSE_EACH(desc.patch, int, TXM_BAD_ARGUMENT, 1, -1, 16385, INT_MAX, INT_MIN);
     REFUSE_EACH(desc.passes, int, TXM_BAD_ARGUMENT, 1, -2, 17, INT_MAX, INT_MIN);
     REFUSE_EACH(desc.turns, int, TXM_BAD_ARGUMENT, 1, -1, 3, 5, 8, INT_MAX);
     REFUSE_EACH(desc.novelty, float, TXM_BAD_ARGUMENT, 1, -0.1f, 1.1f, NAN, INFINITY);
@@ -163,7 +163,7 @@ static void test_refuses(void **state) {
     plain.desc.maps = plain.kinds;
     refuse(&plain, TXM_BAD_ARGUMENT, 1);
     plain.desc.maps = NULL;
-    plain.maps[0][0] = new_image(8193, 32, 1, TXM_U8);
+    plain.maps[0][0] = new_image(16385, 32, 1, TXM_U8);
     refuse(&plain, TXM_TOO_LARGE, 1);
     plain.maps[0][0] = new_image(32, 8192, 1, TXM_U8);
     plain.desc.turns = 4;
