@@ -114,7 +114,7 @@
      -ffp-contract=off.
 
    LIMITS
-     Tiles of 32 to 1024 pixels, 2 to 4 colours, 1 to 16 variants, up to 8 maps and 8 exemplars of
+     Tiles of 8 to 1024 pixels (triangles: 32 to 1024), 2 to 4 colours, 1 to 16 variants, up to 8 maps and 8 exemplars of
      64 x 64 pixels or more. Joints are as rough as interiors within a few percent on average and
      35 % for any pair (textiles_measure reports it), unless the tiles are smaller than 64 pixels or
      the exemplar has smooth and rough areas larger than a tile. Cuts compare at most 8 channels;
@@ -171,7 +171,8 @@ enum {
     TEXTILES_MAX_MAPS = 8,      /* pictures in register: albedo, normal, ...    */
     TEXTILES_MAX_EXEMPLARS = 8,
     TEXTILES_MAX_CLASSES = 64,  /* of a frame set                               */
-    TEXTILES_MIN_SIZE = 32,     /* pixels a side                                */
+    TEXTILES_MIN_SIZE = 8,      /* pixels a side of a square ...                */
+    TEXTILES_MIN_TRIANGLE = 32, /* ... and of a triangle                        */
     TEXTILES_MAX_SIZE = 1024
 };
 
@@ -225,8 +226,8 @@ typedef struct textiles_desc {
     const textiles_exemplar *exemplars; /* not modified, need not outlive the call             */
     int exemplar_count;                 /* 1..TEXTILES_MAX_EXEMPLARS                           */
     textiles_kind kind;
-    int size;     /* side of a tile in pixels, 32..1024; an edge of a triangle has size + 1 texels;
-                     0 = 128                                                                     */
+    int size;     /* side of a tile in pixels, 8..1024, of a triangle 32..1024, whose edges have
+                     size + 1 texels; 0 = 128                                                    */
     int colors;   /* per axis, or of corners, or of triangle edges: 2..4 (frame: 1..4); 0 = 2    */
     int variants; /* tiles with the same colours, 1..16; 0 = 1                                   */
     int reduced;  /* wang: only two tiles (times variants) for each pair of north and west colour,
@@ -336,8 +337,8 @@ typedef struct textiles_layout {
 /* Compute where each tile lies.
 
    gutter  0..size/2 pixels around each tile, filled with what a matching neighbour shows there: 1
-           is enough for bilinear filtering, 2^n for mip-map level n; -1 = 8 (TORUS: must be 0 or
-           -1). Rounded up to a power of two; tiles and gutters begin at multiples of it, so that no
+           is enough for bilinear filtering, 2^n for mip-map level n; -1 = 8, in small tiles size/2
+           (TORUS: must be 0 or -1). Rounded up to a power of two; tiles and gutters begin at multiples of it, so that no
            pixel of these levels belongs to two tiles. In a set of textiles_make the first 2 pixels
            are the same for all neighbours that match; the others are those of one such neighbour.
    return  TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
@@ -575,10 +576,12 @@ static txm_status txt_cancelled(txm_env *env) {
 /* The checks of a description that made and imported sets have in common. */
 static txm_status txt_check_kind(const textiles_desc *d, txm_env *env) {
     const int low = d->kind == TEXTILES_FRAME ? 1 : 2;
+    const int least = d->kind == TEXTILES_TRIANGLE ? TEXTILES_MIN_TRIANGLE : TEXTILES_MIN_SIZE;
     if ((int)d->kind < TEXTILES_WANG || (int)d->kind > TEXTILES_FRAME)
         return txm_fail(env, TXM_BAD_ARGUMENT, "kind is none of textiles_kind");
-    if (d->size && (d->size < TEXTILES_MIN_SIZE || d->size > TEXTILES_MAX_SIZE))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "size must be 32 to 1024 pixels, or 0 for 128");
+    if (d->size && (d->size < least || d->size > TEXTILES_MAX_SIZE))
+        return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "size must be # to # pixels, or 0 for 128",
+                                (uint64_t)least, TEXTILES_MAX_SIZE);
     if (d->colors && (d->colors < low || d->colors > TEXTILES_MAX_COLORS))
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "colors must be 2 to 4 (of a frame set 1 to 4), or 0 for 2");
@@ -2384,7 +2387,7 @@ TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_p
     l.colors = set->colors;
     l.variants = set->variants;
     l.count = set->count;
-    l.gutter = torus ? 0 : gutter < 0 ? 8 : gutter;
+    l.gutter = torus ? 0 : gutter < 0 ? 8 < set->size / 2 ? 8 : set->size / 2 : gutter;
     const txm_status status = txt_lay_out(&l, env);
     if (status == TXM_OK) *layout = l;
     return status;
@@ -3386,11 +3389,20 @@ static void txt_scratch_make(const txt_build *b, txm_arena *arena, txt_scratch *
 enum {
     TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
     TXT_NEAR = 4,         /* texels from the vertex where the piece of a corner may end ...    */
-    TXT_FAR = 12,         /* ... and where it must have ended                                  */
+    TXT_FAR = 12,         /* ... and where it must have ended; less in small tiles             */
     TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
-    TXT_CORNERS = 160     /* random places that are rated for each corner                      */
+    TXT_CORNERS = 160,    /* random places that are rated for each corner                      */
+    TXT_SAME_PLACE = 300  /* gray levels for a strip that another colour shows already         */
 };
-#define TXT_END 8             /* texels of a joint that show the corner, about               */
+#define TXT_END 8             /* texels of a joint that show the corner, about; less in small tiles */
+
+static int txt_near(const txt_build *b) {
+    return b->set->size / 8 < TXT_NEAR ? b->set->size / 8 : TXT_NEAR;
+}
+
+static int txt_end(const txt_build *b) {
+    return b->set->size / 4 < TXT_END ? b->set->size / 4 : TXT_END;
+}
 
 static int txt_zone_end(const txt_build *b) {
     return b->set->size / 4 < TXT_FAR ? b->set->size / 4 : TXT_FAR;
@@ -3488,6 +3500,7 @@ static void txt_strip_extra(const void *context, int sheet, int i, int j, int n,
                 int across = q->axis ? abs(oi - (i + k)) : abs(oj - j);
                 int along = q->axis ? abs(oj - j) : abs(oi + txt_half(oj * b->is_triangle) -
                                                         (i + k + txt_half(j * b->is_triangle)));
+                if (across == 0 && along == 0) cost[k] += TXT_SAME_PLACE * TXT_SCALE;
                 if (across < 16 && along < q->length)
                     cost[k] += (uint32_t)((16 - across) * (q->length - along) * 30 / q->length *
                                           TXT_SCALE / 16);
@@ -3508,14 +3521,14 @@ static void txt_end_samples(const txt_build *b, txt_query *q, const txt_seam_str
             if (at_start) {
                 int a = from + k;
                 if (w > 1) a -= zone / 2; /* the overlap with the segment before */
-                else if (!b->is_triangle) a += 3;
+                else if (!b->is_triangle) a += txt_near(b) - 1;
                 txt_along(b, s->axis, a, u, &i, &j);
                 if (!b->is_triangle || w > 1 || k <= 6)
                     txt_sample_add(b, q, i, j, txt_strip_shows(b, s, w - 1, a, u));
             }
             if (at_end) {
                 int a = size - k;
-                if (!b->is_triangle) a -= 3;
+                if (!b->is_triangle) a -= txt_near(b) - 1;
                 txt_along(b, s->axis, a, u, &i, &j);
                 if (!b->is_triangle || k <= 6)
                     txt_sample_add(b, q, i, j, txt_strip_shows(b, s, s->count + 1, a, u));
@@ -3540,16 +3553,16 @@ static int txt_segment_count(const txt_build *b, int axis, int only_sheet) {
 /* The mean step that a strip should have between its ends, TXT_END texels each that show the
    corners, so that the whole joint has b->wanted_step. */
 static double txt_wanted_step(const txt_build *b, const txt_seam_strip *s) {
-    const int size = b->set->size, axis = s->axis;
+    const int size = b->set->size, axis = s->axis, length = txt_end(b);
     double ends = 0;
     if (b->is_triangle || !b->corners_are_final) return b->wanted_step;
     for (int end = 0; end < 2; end++) {
-        const int c = s->corner[end], back = end ? TXT_END : 0;
+        const int c = s->corner[end], back = end ? length : 0;
         ends += txt_line_mean(b, &b->cross[axis], axis, b->corner[c].sheet,
                               b->corner[c].i - (axis ? 0 : back),
-                              b->corner[c].j - (axis ? back : 0), TXT_END);
+                              b->corner[c].j - (axis ? back : 0), length);
     }
-    const double rest = (b->wanted_step * size - TXT_END * ends) / (size - 2 * TXT_END);
+    const double rest = (b->wanted_step * size - length * ends) / (size - 2 * length);
     return fmin(fmax(rest, 0.75), 1.25);
 }
 
@@ -3563,7 +3576,7 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
     s->count = count;
     for (int g = 0; g < count; g++) {
         const int from = g * size / count, to = (g + 1) * size / count;
-        const int ends = count == 1 && !b->is_triangle ? TXT_END : 0;
+        const int ends = count == 1 && !b->is_triangle ? txt_end(b) : 0;
         txt_strip_query extra = {b, others, other_count, s->axis, from + ends, to - from - 2 * ends};
         txt_place best;
         int found = 0;
@@ -3574,8 +3587,8 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
         q->apart = 1;
         txt_end_samples(b, q, s, g + 1, from, 1, g + 1 == count);
         for (int k = 0; k < 4; k++) { /* it must cover its part and overlap the next ones */
-            const int first = g ? from - 7 : b->is_triangle ? 0 : TXT_NEAR;
-            const int last = g + 1 < count ? to + 7 : b->is_triangle ? size : size - TXT_NEAR;
+            const int first = g ? from - 7 : b->is_triangle ? 0 : txt_near(b);
+            const int last = g + 1 < count ? to + 7 : b->is_triangle ? size : size - txt_near(b);
             txt_along(b, s->axis, k & 1 ? last : first, k & 2 ? TXT_LOCK : -TXT_LOCK,
                       &q->need[k][0], &q->need[k][1]);
         }
@@ -3624,7 +3637,7 @@ static void txt_cut_strip(const txt_build *b, txt_seam_strip *s, int w, int from
 
 /* Cut all pieces of a strip, and note which of them each texel shows. */
 static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
-    const int size = b->set->size, n = b->lock_count, zone = txt_zone_end(b);
+    const int size = b->set->size, n = b->lock_count, zone = txt_zone_end(b), nearest = txt_near(b);
     if (b->is_triangle) {
         memset(s->which, 1, (size_t)(size + 1) * (size_t)n);
         for (int g = 1; g < s->count; g++)
@@ -3634,10 +3647,10 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
         return;
     }
     memset(s->which, 0, (size_t)size * (size_t)n);
-    txt_cut_strip(b, s, 0, TXT_NEAR, zone);
+    txt_cut_strip(b, s, 0, nearest, zone);
     for (int g = 1; g < s->count; g++)
         txt_cut_strip(b, s, g, g * size / s->count - 6, g * size / s->count + 6);
-    txt_cut_strip(b, s, s->count, size - zone - 1, size - TXT_NEAR - 1);
+    txt_cut_strip(b, s, s->count, size - zone - 1, size - nearest - 1);
 }
 
 /* The cost of a place as a corner: how far it is from typical roughness and salience. */
@@ -4525,7 +4538,8 @@ static void txt_cut_tile(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, size = b->set->size;
     const size_t bytes = (size_t)side * (size_t)side * sizeof *c->label;
-    const int forced = b->is_triangle ? size / 6 : size / 5;
+    const int depth = b->is_triangle ? size / 6 : size / 5;
+    const int forced = depth > TXT_LOCK ? depth : TXT_LOCK; /* what tiles share stays */
     int64_t least = 0;
     c->best_place = -1;
     if (txt_block_side(b) < side || c->place_count == 0) {

@@ -84,7 +84,7 @@ static void one_line(const char *path, const txm_image *picture) {
 /* Pictures that nobody looks at: the plane takes the same time for any. */
 static void make_plane(textiles_kind kind, int colors, int variants, textiles_set **set,
                        textiles_plane *plane) {
-    enum { SIDE = TEXTILES_MIN_SIZE };
+    enum { SIDE = TEXTILES_MIN_TRIANGLE };
     static uint8_t pixels[(SIDE + 1) * (SIDE + 1)];
     const int c = colors, count = (kind == TEXTILES_TRIANGLE ? (8 * c * c * c + 4 * c) / 3
                                                              : c * c * c * c) * variants;

@@ -114,7 +114,7 @@
      -ffp-contract=off.
 
    LIMITS
-     Tiles of 32 to 1024 pixels, 2 to 4 colours, 1 to 16 variants, up to 8 maps and 8 exemplars of
+     Tiles of 8 to 1024 pixels (triangles: 32 to 1024), 2 to 4 colours, 1 to 16 variants, up to 8 maps and 8 exemplars of
      64 x 64 pixels or more. Joints are as rough as interiors within a few percent on average and
      35 % for any pair (textiles_measure reports it), unless the tiles are smaller than 64 pixels or
      the exemplar has smooth and rough areas larger than a tile. Cuts compare at most 8 channels;
@@ -171,7 +171,8 @@ enum {
     TEXTILES_MAX_MAPS = 8,      /* pictures in register: albedo, normal, ...    */
     TEXTILES_MAX_EXEMPLARS = 8,
     TEXTILES_MAX_CLASSES = 64,  /* of a frame set                               */
-    TEXTILES_MIN_SIZE = 32,     /* pixels a side                                */
+    TEXTILES_MIN_SIZE = 8,      /* pixels a side of a square ...                */
+    TEXTILES_MIN_TRIANGLE = 32, /* ... and of a triangle                        */
     TEXTILES_MAX_SIZE = 1024
 };
 
@@ -225,8 +226,8 @@ typedef struct textiles_desc {
     const textiles_exemplar *exemplars; /* not modified, need not outlive the call             */
     int exemplar_count;                 /* 1..TEXTILES_MAX_EXEMPLARS                           */
     textiles_kind kind;
-    int size;     /* side of a tile in pixels, 32..1024; an edge of a triangle has size + 1 texels;
-                     0 = 128                                                                     */
+    int size;     /* side of a tile in pixels, 8..1024, of a triangle 32..1024, whose edges have
+                     size + 1 texels; 0 = 128                                                    */
     int colors;   /* per axis, or of corners, or of triangle edges: 2..4 (frame: 1..4); 0 = 2    */
     int variants; /* tiles with the same colours, 1..16; 0 = 1                                   */
     int reduced;  /* wang: only two tiles (times variants) for each pair of north and west colour,
@@ -336,8 +337,8 @@ typedef struct textiles_layout {
 /* Compute where each tile lies.
 
    gutter  0..size/2 pixels around each tile, filled with what a matching neighbour shows there: 1
-           is enough for bilinear filtering, 2^n for mip-map level n; -1 = 8 (TORUS: must be 0 or
-           -1). Rounded up to a power of two; tiles and gutters begin at multiples of it, so that no
+           is enough for bilinear filtering, 2^n for mip-map level n; -1 = 8, in small tiles size/2
+           (TORUS: must be 0 or -1). Rounded up to a power of two; tiles and gutters begin at multiples of it, so that no
            pixel of these levels belongs to two tiles. In a set of textiles_make the first 2 pixels
            are the same for all neighbours that match; the others are those of one such neighbour.
    return  TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */

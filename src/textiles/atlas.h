@@ -390,7 +390,7 @@ TEXTILES_API txm_status textiles_layout_make(const textiles_set *set, textiles_p
     l.colors = set->colors;
     l.variants = set->variants;
     l.count = set->count;
-    l.gutter = torus ? 0 : gutter < 0 ? 8 : gutter;
+    l.gutter = torus ? 0 : gutter < 0 ? 8 < set->size / 2 ? 8 : set->size / 2 : gutter;
     const txm_status status = txt_lay_out(&l, env);
     if (status == TXM_OK) *layout = l;
     return status;

@@ -8,11 +8,20 @@
 enum {
     TXT_LOCK = 2,         /* texels on either side of a joint that all tiles share             */
     TXT_NEAR = 4,         /* texels from the vertex where the piece of a corner may end ...    */
-    TXT_FAR = 12,         /* ... and where it must have ended                                  */
+    TXT_FAR = 12,         /* ... and where it must have ended; less in small tiles             */
     TXT_ACROSS = 6,       /* half width of the strip in which such a cut is sought             */
-    TXT_CORNERS = 160     /* random places that are rated for each corner                      */
+    TXT_CORNERS = 160,    /* random places that are rated for each corner                      */
+    TXT_SAME_PLACE = 300  /* gray levels for a strip that another colour shows already         */
 };
-#define TXT_END 8             /* texels of a joint that show the corner, about               */
+#define TXT_END 8             /* texels of a joint that show the corner, about; less in small tiles */
+
+static int txt_near(const txt_build *b) {
+    return b->set->size / 8 < TXT_NEAR ? b->set->size / 8 : TXT_NEAR;
+}
+
+static int txt_end(const txt_build *b) {
+    return b->set->size / 4 < TXT_END ? b->set->size / 4 : TXT_END;
+}
 
 static int txt_zone_end(const txt_build *b) {
     return b->set->size / 4 < TXT_FAR ? b->set->size / 4 : TXT_FAR;
@@ -110,6 +119,7 @@ static void txt_strip_extra(const void *context, int sheet, int i, int j, int n,
                 int across = q->axis ? abs(oi - (i + k)) : abs(oj - j);
                 int along = q->axis ? abs(oj - j) : abs(oi + txt_half(oj * b->is_triangle) -
                                                         (i + k + txt_half(j * b->is_triangle)));
+                if (across == 0 && along == 0) cost[k] += TXT_SAME_PLACE * TXT_SCALE;
                 if (across < 16 && along < q->length)
                     cost[k] += (uint32_t)((16 - across) * (q->length - along) * 30 / q->length *
                                           TXT_SCALE / 16);
@@ -130,14 +140,14 @@ static void txt_end_samples(const txt_build *b, txt_query *q, const txt_seam_str
             if (at_start) {
                 int a = from + k;
                 if (w > 1) a -= zone / 2; /* the overlap with the segment before */
-                else if (!b->is_triangle) a += 3;
+                else if (!b->is_triangle) a += txt_near(b) - 1;
                 txt_along(b, s->axis, a, u, &i, &j);
                 if (!b->is_triangle || w > 1 || k <= 6)
                     txt_sample_add(b, q, i, j, txt_strip_shows(b, s, w - 1, a, u));
             }
             if (at_end) {
                 int a = size - k;
-                if (!b->is_triangle) a -= 3;
+                if (!b->is_triangle) a -= txt_near(b) - 1;
                 txt_along(b, s->axis, a, u, &i, &j);
                 if (!b->is_triangle || k <= 6)
                     txt_sample_add(b, q, i, j, txt_strip_shows(b, s, s->count + 1, a, u));
@@ -162,16 +172,16 @@ static int txt_segment_count(const txt_build *b, int axis, int only_sheet) {
 /* The mean step that a strip should have between its ends, TXT_END texels each that show the
    corners, so that the whole joint has b->wanted_step. */
 static double txt_wanted_step(const txt_build *b, const txt_seam_strip *s) {
-    const int size = b->set->size, axis = s->axis;
+    const int size = b->set->size, axis = s->axis, length = txt_end(b);
     double ends = 0;
     if (b->is_triangle || !b->corners_are_final) return b->wanted_step;
     for (int end = 0; end < 2; end++) {
-        const int c = s->corner[end], back = end ? TXT_END : 0;
+        const int c = s->corner[end], back = end ? length : 0;
         ends += txt_line_mean(b, &b->cross[axis], axis, b->corner[c].sheet,
                               b->corner[c].i - (axis ? 0 : back),
-                              b->corner[c].j - (axis ? back : 0), TXT_END);
+                              b->corner[c].j - (axis ? back : 0), length);
     }
-    const double rest = (b->wanted_step * size - TXT_END * ends) / (size - 2 * TXT_END);
+    const double rest = (b->wanted_step * size - length * ends) / (size - 2 * length);
     return fmin(fmax(rest, 0.75), 1.25);
 }
 
@@ -185,7 +195,7 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
     s->count = count;
     for (int g = 0; g < count; g++) {
         const int from = g * size / count, to = (g + 1) * size / count;
-        const int ends = count == 1 && !b->is_triangle ? TXT_END : 0;
+        const int ends = count == 1 && !b->is_triangle ? txt_end(b) : 0;
         txt_strip_query extra = {b, others, other_count, s->axis, from + ends, to - from - 2 * ends};
         txt_place best;
         int found = 0;
@@ -196,8 +206,8 @@ static uint32_t txt_choose_strip(txt_build *b, txt_seam_strip *s, const txt_seam
         q->apart = 1;
         txt_end_samples(b, q, s, g + 1, from, 1, g + 1 == count);
         for (int k = 0; k < 4; k++) { /* it must cover its part and overlap the next ones */
-            const int first = g ? from - 7 : b->is_triangle ? 0 : TXT_NEAR;
-            const int last = g + 1 < count ? to + 7 : b->is_triangle ? size : size - TXT_NEAR;
+            const int first = g ? from - 7 : b->is_triangle ? 0 : txt_near(b);
+            const int last = g + 1 < count ? to + 7 : b->is_triangle ? size : size - txt_near(b);
             txt_along(b, s->axis, k & 1 ? last : first, k & 2 ? TXT_LOCK : -TXT_LOCK,
                       &q->need[k][0], &q->need[k][1]);
         }
@@ -246,7 +256,7 @@ static void txt_cut_strip(const txt_build *b, txt_seam_strip *s, int w, int from
 
 /* Cut all pieces of a strip, and note which of them each texel shows. */
 static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
-    const int size = b->set->size, n = b->lock_count, zone = txt_zone_end(b);
+    const int size = b->set->size, n = b->lock_count, zone = txt_zone_end(b), nearest = txt_near(b);
     if (b->is_triangle) {
         memset(s->which, 1, (size_t)(size + 1) * (size_t)n);
         for (int g = 1; g < s->count; g++)
@@ -256,10 +266,10 @@ static void txt_finish_strip(const txt_build *b, txt_seam_strip *s) {
         return;
     }
     memset(s->which, 0, (size_t)size * (size_t)n);
-    txt_cut_strip(b, s, 0, TXT_NEAR, zone);
+    txt_cut_strip(b, s, 0, nearest, zone);
     for (int g = 1; g < s->count; g++)
         txt_cut_strip(b, s, g, g * size / s->count - 6, g * size / s->count + 6);
-    txt_cut_strip(b, s, s->count, size - zone - 1, size - TXT_NEAR - 1);
+    txt_cut_strip(b, s, s->count, size - zone - 1, size - nearest - 1);
 }
 
 /* The cost of a place as a corner: how far it is from typical roughness and salience. */

@@ -353,7 +353,8 @@ static void txt_cut_tile(txt_canvas *c) {
     const txt_build *b = c->b;
     const int side = c->side, size = b->set->size;
     const size_t bytes = (size_t)side * (size_t)side * sizeof *c->label;
-    const int forced = b->is_triangle ? size / 6 : size / 5;
+    const int depth = b->is_triangle ? size / 6 : size / 5;
+    const int forced = depth > TXT_LOCK ? depth : TXT_LOCK; /* what tiles share stays */
     int64_t least = 0;
     c->best_place = -1;
     if (txt_block_side(b) < side || c->place_count == 0) {

@@ -84,10 +84,12 @@ static txm_status txt_cancelled(txm_env *env) {
 /* The checks of a description that made and imported sets have in common. */
 static txm_status txt_check_kind(const textiles_desc *d, txm_env *env) {
     const int low = d->kind == TEXTILES_FRAME ? 1 : 2;
+    const int least = d->kind == TEXTILES_TRIANGLE ? TEXTILES_MIN_TRIANGLE : TEXTILES_MIN_SIZE;
     if ((int)d->kind < TEXTILES_WANG || (int)d->kind > TEXTILES_FRAME)
         return txm_fail(env, TXM_BAD_ARGUMENT, "kind is none of textiles_kind");
-    if (d->size && (d->size < TEXTILES_MIN_SIZE || d->size > TEXTILES_MAX_SIZE))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "size must be 32 to 1024 pixels, or 0 for 128");
+    if (d->size && (d->size < least || d->size > TEXTILES_MAX_SIZE))
+        return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "size must be # to # pixels, or 0 for 128",
+                                (uint64_t)least, TEXTILES_MAX_SIZE);
     if (d->colors && (d->colors < low || d->colors > TEXTILES_MAX_COLORS))
         return txm_fail(env, TXM_BAD_ARGUMENT,
                         "colors must be 2 to 4 (of a frame set 1 to 4), or 0 for 2");

@@ -129,6 +129,17 @@ static void test_sizes(void **state) {
     try_size(TEXTILES_FRAME, 65, 67, 2, 32, 1, 1);
 }
 
+/* Down to 8 pixels a side. */
+static void test_small_tiles(void **state) {
+    static const int sizes[] = {8, 9, 12, 16, 24, 31};
+    (void)state;
+    for (int k = 0; k < 6; k++) {
+        try_size(TEXTILES_WANG, 96, 80, 3, sizes[k], 2, 1);
+        try_size(TEXTILES_CORNER, 64, 70, 1, sizes[k], 2, 1);
+        try_size(TEXTILES_FRAME, 64, 96, 4, sizes[k], 2, 1);
+    }
+}
+
 static void test_small_exemplars(void **state) {
     (void)state;
     tk_wide();
@@ -242,6 +253,7 @@ int main(void) {
         cmocka_unit_test(test_sixteen_bits),
         cmocka_unit_test(test_several_exemplars),
         cmocka_unit_test(test_sizes),
+        cmocka_unit_test(test_small_tiles),
         cmocka_unit_test(test_small_exemplars),
         cmocka_unit_test(test_constant),
         cmocka_unit_test(test_strides),

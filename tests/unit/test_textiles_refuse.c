@@ -67,10 +67,13 @@ static void test_bad_arguments(void **state) {
     REFUSES(exemplar_count, 0, TXM_BAD_ARGUMENT);
     REFUSES(exemplar_count, -1, TXM_BAD_ARGUMENT);
     REFUSES(exemplar_count, 9, TXM_BAD_ARGUMENT);
-    REFUSES(size, 31, TXM_BAD_ARGUMENT);
+    REFUSES(size, 7, TXM_BAD_ARGUMENT);
     REFUSES(size, 1, TXM_BAD_ARGUMENT);
     REFUSES(size, -32, TXM_BAD_ARGUMENT);
     REFUSES(size, 1025, TXM_BAD_ARGUMENT);
+    good.kind = TEXTILES_TRIANGLE;
+    REFUSES(size, 31, TXM_BAD_ARGUMENT);
+    good.kind = TEXTILES_WANG;
     REFUSES(size, INT_MAX, TXM_BAD_ARGUMENT);
     REFUSES(colors, 1, TXM_BAD_ARGUMENT);
     REFUSES(colors, 5, TXM_BAD_ARGUMENT);

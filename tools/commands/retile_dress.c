@@ -148,16 +148,16 @@ static int parse_tiles(const cJSON *json, tile_file *f, const char **why) {
 
 /* A set for assigning only: all its tiles share one small gray picture. */
 static txm_status import_tiles(retile_job *j, tile_file *f, textiles_set **set) {
-    static unsigned char gray[(TEXTILES_MIN_SIZE + 1) * (TEXTILES_MIN_SIZE + 1)];
+    static unsigned char gray[(TEXTILES_MIN_TRIANGLE + 1) * (TEXTILES_MIN_TRIANGLE + 1)];
     txm_image *images = (txm_image *)calloc((size_t)f->count, sizeof *images);
     if (!images) return TXM_OUT_OF_MEMORY;
     for (int i = 0; i < f->count; i++) {
         images[i].pixels = gray;
-        images[i].width = images[i].height = TEXTILES_MIN_SIZE + 1;
+        images[i].width = images[i].height = TEXTILES_MIN_TRIANGLE + 1;
         images[i].channels = 1;
     }
     f->desc.kind = TEXTILES_TRIANGLE;
-    f->desc.size = TEXTILES_MIN_SIZE;
+    f->desc.size = TEXTILES_MIN_TRIANGLE;
     const txm_status result = textiles_import(&f->desc, images, f->count, 1, &j->run.env, set);
     free(images);
     return result;
