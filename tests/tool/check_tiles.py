@@ -3,7 +3,8 @@
 
 The schema of docs/, and what a schema cannot say: all combinations of colours are there, tiles and
 their gutters lie apart and inside the atlas, uv agrees with x and y, equal colours mean equal pixels
-along the joint, and the preview lays tiles of the atlas side by side that may lie so.
+along the joint, and the preview lays tiles of the atlas side by side that may lie so. tiles.tsx and tiles.tres
+say the same as tiles.json; if Tiled is installed it draws a map with the set, which must be the tiles.
 
     check_tiles.py FOLDER --different   nothing but that no two square tiles are the same picture
     check_tiles.py FOLDER --damaged     damage the document in many ways; each must be noticed
@@ -11,7 +12,12 @@ along the joint, and the preview lays tiles of the atlas side by side that may l
 import copy
 import json
 import os
+import re
+import shutil
+import subprocess
 import sys
+import tempfile
+import xml.etree.ElementTree
 
 import jsonschema
 
@@ -327,6 +333,125 @@ def check_damages(doc, folder, reduced, classes):
     return missed
 
 
+# ---- sets for other programs
+
+def cells(doc):
+    """Column and row of each tile in the grid of the atlas."""
+    atlas = doc["atlas"]
+    return [((t["x"] - atlas["gutter"]) // atlas["pitch"][0], (t["y"] - atlas["gutter"]) // atlas["pitch"][1])
+            for t in doc["tiles"]]
+
+
+def colors_of(doc):
+    key = "corners" if doc["kind"] == "corner" else "edges"
+    return [t[key] for t in doc["tiles"]]
+
+
+def check_tiled(doc, folder):
+    path = os.path.join(folder, "tiles.tsx")
+    tileset = xml.etree.ElementTree.parse(path).getroot()
+    atlas, size = doc["atlas"], doc["size"]
+    want = {"tilewidth": size, "tileheight": size, "spacing": atlas["pitch"][0] - size,
+            "margin": atlas["gutter"], "columns": atlas["columns"],
+            "tilecount": atlas["columns"] * (atlas["height"] // atlas["pitch"][1])}
+    for name, value in want.items():
+        need(tileset.get(name) == str(value), path, name, "is", tileset.get(name), "not", value)
+    image = tileset.find("image").attrib
+    need(image == {"source": "atlas.png", "width": str(atlas["width"]), "height": str(atlas["height"])}, path, image)
+    wang = tileset.find("wangsets").find("wangset")
+    is_corner = doc["kind"] == "corner"
+    need(wang.get("type") == ("corner" if is_corner else "edge"), path, "is of another type")
+    need(len(wang.findall("wangcolor")) == doc["colors"], path, "has other colors")
+    ids = {int(t.get("tileid")): list(map(int, t.get("wangid").split(","))) for t in wang.findall("wangtile")}
+    need(len(ids) == len(doc["tiles"]), path, "has", len(ids), "tiles")
+    order = (7, 1, 3, 5) if is_corner else (0, 2, 4, 6)  # from the top edge on, clockwise
+    numbers = [row * atlas["columns"] + column for column, row in cells(doc)]
+    for number, colors in zip(numbers, colors_of(doc)):
+        parts = ids[number]
+        need([parts[k] - 1 for k in order] == colors and sum(parts[k] for k in order) == sum(parts),
+             path, "tile", number, "has the colors", parts)
+    if shutil.which("tmxrasterizer"):
+        check_drawn(doc, folder, numbers)
+
+
+def check_drawn(doc, folder, numbers):
+    """Tiled's own program draws all tiles in a row."""
+    size, count = doc["size"], len(numbers)
+    with tempfile.TemporaryDirectory() as scratch:
+        for name in "tiles.tsx", "atlas.png":
+            shutil.copy(os.path.join(folder, name), scratch)
+        with open(os.path.join(scratch, "map.tmx"), "w") as file:
+            file.write('<map version="1.8" orientation="orthogonal" width="%d" height="1" tilewidth="%d" '
+                       'tileheight="%d"><tileset firstgid="1" source="tiles.tsx"/><layer id="1" name="a" '
+                       'width="%d" height="1"><data encoding="csv">%s</data></layer></map>' % (
+                           count, size, size, count, ",".join(str(n + 1) for n in numbers)))
+        result = subprocess.run(["tmxrasterizer", "map.tmx", "map.png"], cwd=scratch, capture_output=True,
+                                env=dict(os.environ, QT_QPA_PLATFORM="offscreen"))
+        need(result.returncode == 0, "Tiled:", result.stderr)
+        drawn = Picture(os.path.join(scratch, "map.png"))
+    atlas = Picture(os.path.join(folder, "atlas.png"))
+    need((drawn.width, drawn.height) == (count * size, size), "Tiled draws", drawn.width, drawn.height)
+    for i, tile in enumerate(doc["tiles"]):
+        for y in range(0, size, 3):
+            for x in range(0, size, 3):
+                a, b = atlas.block(tile["x"] + x, tile["y"] + y, 1, 1), drawn.block(i * size + x, y, 1, 1)
+                if atlas.channels == 1:
+                    a = a * 3
+                if atlas.channels in (1, 3):
+                    need(a[:3] == b[:3], "Tiled draws another tile", i)
+
+
+VALUES = (r'"[^"]*"', r"-?\d+", r"Vector2i\(\d+, \d+\)", r"Color\([\d.]+, [\d.]+, [\d.]+, 1\)",
+          r'ExtResource\("1"\)', r'SubResource\("2"\)')
+
+
+def check_godot(doc, folder):
+    """By the published format of resources: tags, then names with values, of which none is repeated."""
+    path, sections = os.path.join(folder, "tiles.tres"), []
+    with open(path) as file:
+        for line in filter(None, file.read().split("\n")):
+            if line.startswith("["):
+                sections.append((line, {}))
+                continue
+            name, value = line.split(" = ")
+            need(any(re.fullmatch(v, value) for v in VALUES), path, "has a value", value)
+            need(name not in sections[-1][1], path, "has", name, "twice")
+            sections[-1][1][name] = value
+    tags = ['[gd_resource type="TileSet" load_steps=3 format=3]',
+            '[ext_resource type="Texture2D" path="atlas.png" id="1"]',
+            '[sub_resource type="TileSetAtlasSource" id="2"]', "[resource]"]
+    need([tag for tag, _ in sections] == tags, path, "has other sections")
+    source, resource = sections[2][1], sections[3][1]
+    atlas, size = doc["atlas"], doc["size"]
+
+    def take(values, name, value):
+        need(values.pop(name, None) == value, path, name, "is not", value)
+
+    take(source, "texture", 'ExtResource("1")')
+    for name, x, y in (("margins", atlas["gutter"], atlas["gutter"]), ("texture_region_size", size, size),
+                       ("separation", atlas["pitch"][0] - size, atlas["pitch"][1] - size)):
+        take(source, name, "Vector2i(%d, %d)" % (x, y))
+    is_corner = doc["kind"] == "corner"
+    names = (["top_left_corner", "top_right_corner", "bottom_right_corner", "bottom_left_corner"] if is_corner
+             else ["top_side", "right_side", "bottom_side", "left_side"])
+    for (column, row), colors in zip(cells(doc), colors_of(doc)):
+        tile = "%d:%d/0" % (column, row)
+        take(source, tile, "0")
+        take(source, tile + "/terrain_set", "0")
+        main = source.pop(tile + "/terrain")
+        need(colors.count(int(main)) == max(map(colors.count, colors)), path, tile, "is of terrain", main)
+        for name, color in zip(names, colors):
+            take(source, "%s/terrains_peering_bit/%s" % (tile, name), str(color))
+    need(not source, path, "has too much:", source)
+    take(resource, "tile_size", "Vector2i(%d, %d)" % (size, size))
+    take(resource, "terrain_set_0/mode", "1" if is_corner else "2")
+    take(resource, "sources/0", 'SubResource("2")')
+    for c in range(doc["colors"]):
+        take(resource, "terrain_set_0/terrain_%d/name" % c, '"color %d"' % c)
+        resource.pop("terrain_set_0/terrain_%d/color" % c)
+    need(not resource, path, "has too much:", resource)
+
+
 def main():
     options = sys.argv[2:]
     folder, reduced, classes = sys.argv[1], "--reduced" in options, None
@@ -347,6 +472,9 @@ def main():
         atlas = Picture(os.path.join(folder, "atlas.png"))
         check_joints(doc, atlas)
         check_preview(doc, atlas, Picture(os.path.join(folder, "preview.png")), not classes)
+        if doc["kind"] != "triangle":
+            check_tiled(doc, folder)
+            check_godot(doc, folder)
     except Wrong as wrong:
         print("%s: %s" % (folder, wrong))
         return 1

@@ -342,7 +342,9 @@ holds() {
 for kind in wang corner triangle frame; do
     check "tiles --kind $kind" run 0 tiles cells.png -o $kind --kind $kind --size 32
     check "tells what it made" grep -q "^$kind: .* tiles, atlas .* steps at joints" out.log
-    check "makes the folder with three files" holds $kind atlas.png preview.png tiles.json
+    engines="tiles.tres tiles.tsx"
+    [ $kind = triangle ] && engines=
+    check "makes the folder with these files" holds $kind atlas.png preview.png tiles.json $engines
     check "the set is whole and true" $check_tiles $kind
     $check_tiles $kind --damaged
 done
@@ -367,6 +369,11 @@ check "triangle, slices" tiles_so --kind triangle --packing slices
 check "wang, slices, gutter 1" tiles_so --kind wang --packing slices --gutter 1
 check "frame, 1 color, 16 variants" tiles_so --kind frame --colors 1 --variants 16
 check "corner, odd size" tiles_so --kind corner --size 45
+check "wang, 8 pixels" tiles_so --kind wang --size 8
+check "corner, 16 pixels, 3 colors" tiles_so --kind corner --size 16 --colors 3
+check "frame, 11 pixels, no gutter" tiles_so --kind frame --size 11 --gutter 0
+refuses 2 "of triangles at least 32" tiles cells.png -o n --kind triangle --size 31
+refuses 2 "--size" tiles cells.png -o n --kind wang --size 7
 check "wang, --repair none" tiles_so --kind wang --repair none
 classes='0,0,0,0;0,1,0,0;1,1,0,1'
 check "frame --classes" run 0 tiles cells.png -o classes --size 32 --kind frame \
@@ -382,20 +389,22 @@ check "the gray set is whole" $check_tiles gray
 
 # ---- tiles: the folder
 check "a name that ends in /" run 0 tiles cells.png -o slash/ --kind frame --size 32
-check "makes the same folder" holds slash atlas.png preview.png tiles.json
+check "makes the same folder" holds slash atlas.png preview.png tiles.json tiles.tres tiles.tsx
 mkdir there
 echo old >there/atlas.png
 echo mine >there/mine.txt
 check "an existing folder" run 0 tiles cells.png -o there --kind wang --size 32
 check "its other files stay" sh -c "grep -q mine there/mine.txt && cmp there/atlas.png wang/atlas.png"
-check "nothing else is in it" holds there atlas.png mine.txt preview.png tiles.json
+check "nothing else is in it" holds there atlas.png mine.txt preview.png tiles.json tiles.tres \
+    tiles.tsx
 check "--quiet says nothing" sh -c "
     '$texkit' tiles cells.png -o q --kind frame --size 32 --quiet | wc -c | grep -qx 0"
 check "an odd name" run 0 tiles cells.png -o 'odd tiles;$(x)' --kind frame --size 32
 
 # ---- tiles: maps and more pictures
 check "--maps" run 0 tiles cells.png -o maps --kind wang --size 32 --maps clouds.png,cells-gray.png
-check "an atlas for each map" holds maps atlas.png atlas-2.png atlas-3.png preview.png tiles.json
+check "an atlas for each map" holds maps atlas.png atlas-2.png atlas-3.png preview.png \
+    tiles.json tiles.tres tiles.tsx
 check "the set with maps is whole" $check_tiles maps
 check "maps keep their channels" \
     test "$(byte maps/atlas-2.png 25) $(byte maps/atlas-3.png 25)" = "2 0"

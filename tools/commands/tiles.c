@@ -1,12 +1,9 @@
 /* tiles.c - texkit tiles: a photograph in, a tile set out
    SPDX-License-Identifier: MIT OR Unlicense */
 #define _XOPEN_SOURCE 700 /* POSIX: open_memstream */
-#include "command.h"
+#include "tiles.h"
 #include "files/image_io.h"
 #include "straighten.h"
-#include "textiles.h"
-
-#include <stdio.h>
 
 enum {
     PREVIEW_TILES = 8,     /* along a side of the preview; fewer, but at least 2, ... */
@@ -27,6 +24,8 @@ static const cli_manual tiles_manual = {
     "not there, receives atlas.png, tiles.json (see docs/tiles.md) and preview.png. The\n"
     "edges of a tile are unchanged pixels of EXEMPLAR on both sides of the joint. A side of\n"
     "EXEMPLAR should be at least three times that of a tile.\n"
+    "Squares are also written as tiles.tsx for Tiled (with Wang colors) and as tiles.tres for\n"
+    "Godot 4 (with a terrain set).\n"
     "Maps of the same material (normals, roughness) are cut in register with --maps:\n"
     "atlas-2.png holds the first of them, and so on. The alpha of a map says how much of its colors\n"
     "shows, unless --data names it. Uneven light of EXEMPLAR and of --more and --edges, not that of\n"
@@ -41,10 +40,18 @@ static void name_atlas(int map, char name[24]) {
     snprintf(name, 24, map ? "atlas-%d.png" : "atlas.png", map + 1);
 }
 
+/* The documents of a set; triangles have the first only. */
+enum { DOCUMENTS = 3 };
+static const char *const document_names[DOCUMENTS] = {"tiles.json", "tiles.tsx", "tiles.tres"};
+static int document_count(textiles_kind kind) {
+    return kind == TEXTILES_TRIANGLE ? 1 : DOCUMENTS;
+}
+
 /* Announce all that will be written for an exemplar with the maps of that list. */
-static int announce_set(cli *run, const char *maps) {
+static int announce_set(cli *run, textiles_kind kind, const char *maps) {
     int status = cli_writes_inside(run, "preview.png"), count = 1;
-    if (!status) status = cli_writes_inside(run, "tiles.json");
+    for (int d = 0; d < document_count(kind) && !status; d++)
+        status = cli_writes_inside(run, document_names[d]);
     char map[MAX_PATH];
     for (const char *at = maps; at; count++) cli_take_name(&at, ",", map);
     for (int m = 0; m < count && m < TEXTILES_MAX_MAPS && !status; m++) {
@@ -106,6 +113,16 @@ static void print_document(FILE *to, const textiles_set *set, const textiles_lay
     fprintf(to, "  ]\n}\n");
 }
 
+/* Document d of the set in memory; *text is for free(). */
+static int make_document(cli *run, const textiles_set *set, const textiles_layout *layout, int d,
+                         char **text, size_t *size) {
+    FILE *to = open_memstream(text, size);
+    if (to && d == 0) print_document(to, set, layout, textiles_map_count(set));
+    else if (to && d == 1) print_tiled(to, set, layout);
+    else if (to) print_godot(to, set, layout);
+    return !to || ferror(to) | fclose(to) ? fail_memory(run) : CLI_DONE;
+}
+
 /* ---- pictures --------------------------------------------------------------------------- */
 
 /* A part of the plane that the set covers; without a plane, tiles in scan-line order. */
@@ -137,11 +154,10 @@ static txm_status draw_preview(cli *run, const textiles_set *set, const textiles
 static int write_set(cli *run, const textiles_set *set, const textiles_layout *layout) {
     const int maps = textiles_map_count(set);
     txm_image atlas[TEXTILES_MAX_MAPS], preview = {0};
-    cli_file files[TEXTILES_MAX_MAPS + 2];
+    cli_file files[TEXTILES_MAX_MAPS + 1 + DOCUMENTS];
     char names[TEXTILES_MAX_MAPS + 1][24];
     unsigned char *bytes[TEXTILES_MAX_MAPS + 1] = {NULL};
-    char *json = NULL;
-    size_t json_size = 0;
+    char *texts[DOCUMENTS] = {NULL};
     int status = CLI_DONE, count = 0, side = PREVIEW_TILES;
     memset(atlas, 0, sizeof atlas);
 
@@ -171,16 +187,15 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
         files[count].bytes = bytes[m];
         files[count++].size = size;
     }
-    if (!status) {
-        FILE *to = open_memstream(&json, &json_size);
-        if (to) print_document(to, set, layout, maps);
-        if (!to || ferror(to) | fclose(to)) status = fail_memory(run);
-        files[count].name = "tiles.json";
-        files[count].bytes = json;
-        files[count++].size = json_size;
+    for (int d = 0; d < document_count(layout->kind) && !status; d++) {
+        size_t size = 0;
+        status = make_document(run, set, layout, d, &texts[d], &size);
+        files[count].name = document_names[d];
+        files[count].bytes = texts[d];
+        files[count++].size = size;
     }
     if (!status) status = cli_finish_folder(run, files, count);
-    free(json);
+    for (int d = 0; d < DOCUMENTS; d++) free(texts[d]);
     for (int m = 0; m <= maps; m++) free(bytes[m]);
     for (int m = 0; m < maps; m++) free(atlas[m].pixels);
     free(preview.pixels);
@@ -297,6 +312,9 @@ static int check_options(cli *run, const textiles_desc *d, textiles_packing pack
                          int has_edges) {
     const int is_frame = d->kind == TEXTILES_FRAME, size = d->size ? d->size : 128;
     const int colors = d->colors ? d->colors : 2;
+    if (d->kind == TEXTILES_TRIANGLE && size < TEXTILES_MIN_TRIANGLE)
+        return cli_fail(run, CLI_USAGE, "--size %d: of triangles at least %d", size,
+                        TEXTILES_MIN_TRIANGLE);
     if (d->colors == 1 && !is_frame)
         return cli_fail(run, CLI_USAGE, "--colors 1 is for frame sets; give 2 to 4");
     if (d->class_count && !is_frame)
@@ -366,7 +384,7 @@ static int run_tiles(int argc, char **argv) {
          &desc.colors, 1, TEXTILES_MAX_COLORS},
         {CLI_INT, "--variants", "V", "tiles with the same colors, 1 to 16; default 1",
          &desc.variants, 1, TEXTILES_MAX_VARIANTS},
-        {CLI_INT, "--size", "S", "side of a tile in pixels, 32 to 1024; default 128", &desc.size,
+        {CLI_INT, "--size", "S", "side of a tile in pixels, 8 (triangle: 32) to 1024; default 128", &desc.size,
          TEXTILES_MIN_SIZE, TEXTILES_MAX_SIZE},
         {CLI_FLAG, "--reduced", NULL,
          "fewer tiles: wang 2 C^2, for scan-line tiling; triangle 2 C^3, for meshes", &desc.reduced, 0,
@@ -417,7 +435,7 @@ static int run_tiles(int argc, char **argv) {
     if (maps && (more || edges))
         return cli_fail(&run, CLI_USAGE, "--maps goes with one exemplar, without --more and --edges");
     if (data && !parse_data(&run, data, &desc.data_maps)) return CLI_USAGE;
-    status = announce_set(&run, maps);
+    status = announce_set(&run, desc.kind, maps);
     if (status) return status;
 
     cli_stage(&run, "read");
