@@ -161,7 +161,8 @@ typedef struct texpatch_exemplar {
     const txm_image *maps; /* map_count pictures of one size; every exemplar has the same maps:
                               channels and sample type                                       */
     txm_image guide;       /* its guide, the size of the maps, 1..4 channels; pixels NULL: none */
-    txm_image mask;        /* TXM_U8, 1 channel: 0 = never use this pixel; pixels NULL: use all */
+    txm_image mask;        /* the size of the maps: a mask that allows (txm_mask_use in texmath.h):
+                              pixels that do not count are never used; pixels NULL: use all      */
 } texpatch_exemplar;
 
 enum { TEXPATCH_TILE_X = 1, TEXPATCH_TILE_Y = 2 }; /* for texpatch_desc.tileable               */
@@ -188,13 +189,13 @@ typedef struct texpatch_desc {
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
     txm_image guide;    /* what the exemplars' guides should look like in the output: width x
                            height, with their channels and sample type; pixels NULL: none        */
-    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide does not count here;
-                           pixels NULL: it counts everywhere                                     */
+    txm_image guide_mask; /* width x height: a mask that allows, of where the guide counts;
+                           pixels NULL: everywhere                                               */
     float guide_weight; /* 0..16: how much differences in the guide count, relative to a map of
                            weight 1; 0 = 2                                                       */
-    const txm_image *kept; /* map_count pictures of width x height, kept where keep is non-zero;
+    const txm_image *kept; /* map_count pictures of width x height, kept where keep counts;
                            NULL: none. They need not come from the exemplar                      */
-    txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
+    txm_image keep;        /* width x height: a mask that allows                                 */
     uint64_t seed;         /* another seed gives another texture                                 */
 } texpatch_desc;
 
@@ -244,8 +245,7 @@ typedef struct texpatch_source {
 } texpatch_source;
 TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
 
-/* Synthesise a part again: the pixels where `again` is non-zero (TXM_U8, 1 channel, the size of the
-   output). Any remaining steps are done first. All other pixels are kept, and the part is fitted to
+/* Synthesise a part again: the pixels of `again`, a mask that replaces, of the size of the output. Any remaining steps are done first. All other pixels are kept, and the part is fitted to
    them. The following steps do the work, in time proportional to the part's bounding box.
    guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = unchanged */
 TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
@@ -1124,7 +1124,19 @@ typedef struct txp_rows {
     const txp_setup *setup;
     txp_source *source;
     uint8_t *bad;
+    uint8_t *mask[TEXPATCH_MAX_EXEMPLARS]; /* 0: the pixel may not be used; NULL: all may be     */
 } txp_rows;
+
+/* The bytes of a mask; *bytes is NULL without one. */
+static txm_status txp_read_mask(const txm_image *mask, txm_mask_use use, txm_arena *arena,
+                                uint8_t **bytes, txm_env *env) {
+    *bytes = NULL;
+    if (!mask || !mask->pixels) return TXM_OK;
+    *bytes = (uint8_t *)txm_arena_alloc(arena, (size_t)mask->width, (size_t)mask->height);
+    if (!*bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the masks");
+    txm_mask_read(mask, use, *bytes);
+    return TXM_OK;
+}
 
 /* One row of the stack at full size. */
 static void txp_stack_row(void *context, int y) {
@@ -1133,18 +1145,19 @@ static void txp_stack_row(void *context, int y) {
     const txp_stack *k = &s->stack[0];
     const int n = k->sheet[y];
     const txp_sheet *sheet = &s->sheet[n];
-    const txm_image *mask = &r->setup->masks[sheet->exemplar];
+    const txm_image *im = &r->setup->maps[sheet->exemplar][0];
+    const uint8_t *mask = r->mask[sheet->exemplar];
     for (int x = 0; x < k->wide[n]; x++) {
         double ex, ey;
         txp_sheet_place(sheet, x, y - k->first[n], &ex, &ey);
         txp_features(r->setup, s, r->setup->maps[sheet->exemplar],
                      &r->setup->guides[sheet->exemplar], ex, ey, sheet->plain,
                      k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes);
-        if (r->bad && mask->pixels) {
-            const int ix = txm_clampi((int)floor(ex + 0.5), 0, mask->width - 1);
-            const int iy = txm_clampi((int)floor(ey + 0.5), 0, mask->height - 1);
+        if (r->bad && mask) {
+            const int ix = txm_clampi((int)floor(ex + 0.5), 0, im->width - 1);
+            const int iy = txm_clampi((int)floor(ey + 0.5), 0, im->height - 1);
             r->bad[(size_t)y * (size_t)k->width + (size_t)x] =
-                ((const uint8_t *)txm_image_row_const(mask, iy))[ix] == 0;
+                mask[(size_t)iy * (size_t)im->width + (size_t)ix] == 0;
         }
     }
 }
@@ -1156,8 +1169,12 @@ static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena
     uint8_t *bad[TXP_MAX_LEVELS] = {NULL};
     int has_mask = 0;
     txm_status status = TXM_OK;
-    for (int e = 0; e < u->exemplar_count; e++) has_mask |= u->masks[e].pixels != NULL;
+    memset(&rows, 0, sizeof rows);
     txm_arena_init(&scratch, env);
+    for (int e = 0; e < u->exemplar_count && status == TXM_OK; e++) {
+        has_mask |= u->masks[e].pixels != NULL;
+        status = txp_read_mask(&u->masks[e], TXM_MASK_ALLOWS, &scratch, &rows.mask[e], env);
+    }
     for (int l = 0; l < s->levels && status == TXM_OK; l++) {
         status = txp_stack_make(s, &s->stack[l], arena, has_mask, env);
         if (status != TXM_OK || !has_mask) continue;
@@ -1379,16 +1396,6 @@ static txm_status txp_check_picture(const txm_image *im, const char *name, txm_e
     return TXM_OK;
 }
 
-static txm_status txp_check_mask(const txm_image *im, const char *name, int width, int height,
-                                 txm_env *env) {
-    const txm_status status = txm_image_check(im, name, TEXPATCH_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (im->sample != TXM_U8 || im->channels > 1 || im->width != width || im->height != height)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
-                           "must be TXM_U8 with 1 channel and the size of its picture");
-    return TXM_OK;
-}
-
 /* Which of the compared bytes are alpha, and of which others. */
 static void txp_find_alphas(const txp_setup *u, txp_source *s) {
     int n = 0;
@@ -1531,7 +1538,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
                       &u->guide_high);
         }
         if (x->mask.pixels) {
-            status = txp_check_mask(&x->mask, "mask", w, h, env);
+            status = txm_mask_check(&x->mask, "mask", w, h, TEXPATCH_MAX_PIXELS, env);
             u->masks[e] = x->mask;
         }
     }
@@ -1566,7 +1573,8 @@ static txm_status txp_check_guide(const txm_image *guide, const txm_image *mask,
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
                            "must have the size of the output and "
                            "the format of the exemplars' guides");
-    return mask && mask->pixels ? txp_check_mask(mask, "guide_mask", width, height, env) : TXM_OK;
+    if (!mask || !mask->pixels) return TXM_OK;
+    return txm_mask_check(mask, "guide_mask", width, height, TEXPATCH_MAX_PIXELS, env);
 }
 
 /* The fields about the output. */
@@ -1594,7 +1602,7 @@ static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const t
         status = txp_check_guide(&d->guide, &d->guide_mask, u, d->width, d->height, env);
     if (status != TXM_OK || !d->kept) return status;
     if (!d->keep.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "kept needs the mask keep");
-    status = txp_check_mask(&d->keep, "keep", d->width, d->height, env);
+    status = txm_mask_check(&d->keep, "keep", d->width, d->height, TEXPATCH_MAX_PIXELS, env);
     for (int m = 0; m < d->map_count && status == TXM_OK; m++) {
         status = txp_check_picture(&d->kept[m], "kept", env);
         if (status != TXM_OK) return status;
@@ -3160,8 +3168,9 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     }
 }
 
-/* Copy the guide and its mask to the canvas; the margin repeats the border. */
-static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const txm_image *mask,
+/* Copy the guide and its mask to the canvas; the margin repeats the border. mask: a byte for each
+   pixel, 0 where the guide does not count; NULL: it counts everywhere. */
+static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const uint8_t *mask,
                            const txp_given *g) {
     const txp_source *s = job->source;
     const txp_setup *u = &job->setup;
@@ -3175,8 +3184,7 @@ static void txp_guide_load(const texpatch_job *job, const txm_image *guide, cons
             txp_features(u, s, NULL, guide, gx, gy, 1, bytes);
             memcpy(g->pixels + i * (size_t)s->bytes + s->guide_at, bytes + s->guide_at, tail);
             if (g->free_guide)
-                g->free_guide[i] =
-                    mask->pixels && ((const uint8_t *)txm_image_row_const(mask, gy))[gx] == 0;
+                g->free_guide[i] = mask && !mask[(size_t)gy * (size_t)u->width + (size_t)gx];
         }
     }
 }
@@ -3194,7 +3202,8 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
                                        texpatch_job **out) {
     txp_setup setup;
     txp_source source, *s;
-    txm_arena memory, source_memory;
+    txm_arena memory, source_memory, masks;
+    uint8_t *keep = NULL, *counts = NULL;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
@@ -3218,6 +3227,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!wx && width < room) width = room;
     if (!wy && height < room) height = room;
     const size_t pixels = (size_t)width * (size_t)height;
+    txm_arena_init(&masks, env);
     texpatch_job *job = txp_job_make(&setup, s, width, height, desc->seed, &memory, env);
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
@@ -3225,29 +3235,33 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     txp_lattice_start(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
         txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0, &memory);
-        if (memory.failed) goto no_memory;
+        if (memory.failed ||
+            (desc->kept &&
+             txp_read_mask(&desc->keep, TXM_MASK_ALLOWS, &masks, &keep, env) != TXM_OK) ||
+            (s->guide_bytes &&
+             txp_read_mask(&desc->guide_mask, TXM_MASK_ALLOWS, &masks, &counts, env) != TXM_OK))
+            goto no_memory;
         for (int y = 0; y < desc->height && desc->kept; y++) {
-            const uint8_t *keep = (const uint8_t *)txm_image_row_const(&desc->keep, y);
             for (int x = 0; x < desc->width; x++) {
                 const size_t i =
                     (size_t)(y + job->margin_y) * (size_t)width + (size_t)(x + job->margin_x);
-                if (!keep[x]) continue;
+                if (!keep[(size_t)y * (size_t)desc->width + (size_t)x]) continue;
                 job->given.fixed[i] = 1;
                 txp_features(&setup, s, setup.kept, NULL, x, y, 1,
                              job->given.pixels + i * (size_t)s->bytes);
             }
         }
         if (s->guide_bytes) {
-            const txm_image mask =
-                desc->guide_mask.pixels ? txm_image_resolve(desc->guide_mask) : desc->guide_mask;
-            txp_guide_load(job, &guide, &mask, &job->given);
+            txp_guide_load(job, &guide, counts, &job->given);
         }
     }
+    txm_arena_free(&masks);
     job->memory = memory;
     job->source_memory = source_memory;
     *out = job;
     return TXM_OK;
 no_memory:
+    txm_arena_free(&masks);
     txm_arena_free(&memory);
     txm_arena_free(&source_memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
@@ -3652,10 +3666,10 @@ TEXPATCH_API txm_status texpatch_make(const texpatch_desc *desc, txm_env *env,
 /* ---- a part made again ------------------------------------------------------------------ */
 
 /* Is pixel (x, y) of the canvas in the part? The margin is where the border is. */
-static inline int txp_is_in_part(const texpatch_job *job, const txm_image *again, int x, int y) {
+static inline int txp_is_in_part(const texpatch_job *job, const uint8_t *again, int x, int y) {
     x = txm_clampi(x - job->margin_x, 0, job->setup.width - 1);
     y = txm_clampi(y - job->margin_y, 0, job->setup.height - 1);
-    return ((const uint8_t *)txm_image_row_const(again, y))[x] != 0;
+    return again[(size_t)y * (size_t)job->setup.width + (size_t)x] != 0;
 }
 
 /* One axis of the box around a part: with context, large enough for the coarsest level and in steps
@@ -3690,10 +3704,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                                        const txm_image *guide, const txm_image *guide_mask,
                                        uint64_t seed, txm_env *env) {
     txm_status status;
-    txm_arena memory;
+    txm_arena memory, masks;
+    uint8_t *mask, *counts;
     txp_given new_guide;
     txp_origins from;
-    txm_image mask, no_mask;
     int low_x, low_y, high_x = -1, high_y = -1;
     int x0 = 0, y0 = 0, wide = 0, high = 0;
     if (!job || !again) return txm_fail(env, TXM_BAD_ARGUMENT, "job or again is NULL");
@@ -3701,9 +3715,8 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     const txp_setup *u = &job->setup;
     const size_t n = (size_t)s->bytes, all = (size_t)job->width * (size_t)job->height;
     const size_t lanes = (size_t)txp_lanes(s), tail = n - (size_t)s->guide_at;
-    status = txp_check_mask(again, "again", u->width, u->height, env);
+    status = txm_mask_check(again, "again", u->width, u->height, TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
-    mask = txm_image_resolve(*again);
     if (guide) {
         if (!s->guide_bytes)
             return txm_fail(env, TXM_BAD_ARGUMENT, "the job was begun without a guide");
@@ -3712,22 +3725,25 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     }
     status = txp_run(job, env);
     if (status != TXM_OK) return status;
+    memset(&new_guide, 0, sizeof new_guide);
+    txm_arena_init(&memory, env);
+    txm_arena_init(&masks, env);
+    texpatch_job *part = NULL;
+    if (txp_read_mask(again, TXM_MASK_REPLACES, &masks, &mask, env) != TXM_OK ||
+        txp_read_mask(guide ? guide_mask : NULL, TXM_MASK_ALLOWS, &masks, &counts, env) != TXM_OK)
+        goto no_memory;
 
     low_x = job->width;
     low_y = job->height;
     for (int y = 0; y < job->height; y++) {
         for (int x = 0; x < job->width; x++) {
-            if (!txp_is_in_part(job, &mask, x, y)) continue;
+            if (!txp_is_in_part(job, mask, x, y)) continue;
             low_x = x < low_x ? x : low_x;
             high_x = x > high_x ? x : high_x;
             low_y = y < low_y ? y : low_y;
             high_y = y;
         }
     }
-    memset(&new_guide, 0, sizeof new_guide);
-    memset(&no_mask, 0, sizeof no_mask);
-    txm_arena_init(&memory, env);
-    texpatch_job *part = NULL;
     if (guide) {
         txp_given_make(&new_guide, s, all, 0, 1, 0, &memory);
         if (memory.failed) goto no_memory;
@@ -3735,9 +3751,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         status = txp_show(&to, 0, u->tileable, &memory, env);
         if (status != TXM_OK) {
             txm_arena_free(&memory);
+            txm_arena_free(&masks);
             return status;
         }
-        txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
+        txp_guide_load(job, &to, counts, &new_guide);
     }
     if (high_x >= 0) {
         const int top = s->levels - 1;
@@ -3775,7 +3792,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                    tail);
     }
     txm_arena_free(&memory);
-    if (!part) return TXM_OK;
+    if (!part) {
+        txm_arena_free(&masks);
+        return TXM_OK;
+    }
     part->setup.tileable = 0;
     if (wide == job->width) part->setup.tileable |= u->tileable & TEXPATCH_TILE_X;
     if (high == job->height) part->setup.tileable |= u->tileable & TEXPATCH_TILE_Y;
@@ -3786,7 +3806,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         for (int x = 0; x < wide; x++) {
             const size_t i = (size_t)y * (size_t)wide + (size_t)x;
             const size_t k = txp_index(&job->canvas, x0 + x, y0 + y);
-            part->given.fixed[i] = !txp_is_in_part(job, &mask, x0 + x, y0 + y) ||
+            part->given.fixed[i] = !txp_is_in_part(job, mask, x0 + x, y0 + y) ||
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
@@ -3796,8 +3816,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     job->part = part;
     job->part_x = x0;
     job->part_y = y0;
+    txm_arena_free(&masks);
     return TXM_OK;
 no_memory:
+    txm_arena_free(&masks);
     txm_arena_free(&memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a part");
 }

@@ -157,7 +157,8 @@ typedef struct texsyn_model texsyn_model;
 typedef struct texsyn_learn_desc {
     txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
                           outlive the call                                                       */
-    txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
+    txm_image mask;    /* same size: learn where it counts, a mask that allows (txm_mask_use in
+                          texmath.h); pixels NULL = everywhere                                   */
     int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Levels other than
                           the coarsest use pairs of at most 10 of their pixels                   */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
@@ -275,9 +276,9 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 
 typedef struct texsyn_fill_desc {
     txm_image image;  /* 1, 3 or 4 channels, any sample type; not modified                       */
-    txm_image mask;   /* same size, TXM_U8; 1 channel: filled where 128 or more; more channels:
-                         where gray times alpha is at least half of its range. Any shape, anywhere */
-    txm_image source; /* same size and form as mask: where to learn from; pixels NULL = from all
+    txm_image mask;   /* same size: filled where it counts, a mask that replaces (txm_mask_use in
+                         texmath.h). Any shape, anywhere                                         */
+    txm_image source; /* same size: where to learn from, a mask that allows; pixels NULL = from all
                          that is known near the hole                                             */
     const texsyn_model *model; /* what to fill with, of as many channels; NULL = learn it        */
     int relight;               /* non-zero: such a model gets the mean colour and the contrast of
@@ -313,8 +314,8 @@ typedef struct texsyn_knit_desc {
     txm_image a;        /* 1, 3 or 4 channels, any sample type, sides of 16 px or more; not modified */
     txm_image b;        /* the same channels and sample type; of any size of 16 px or more: where it
                            ends it goes on reflected                                              */
-    txm_image layout;   /* size of a, TXM_U8; b where 128 or more (with more channels: where gray
-                           times alpha is at least half of its range), a elsewhere. Any shape     */
+    txm_image layout;   /* size of a: b where it counts, a elsewhere, a mask that divides
+                           (txm_mask_use in texmath.h). Any shape                                 */
     int zone;           /* pixels on either side of the border that are synthesised, 1..64; 0 = 3
                            for pictures of the same texture, 6 for different ones                 */
     float roughness;    /* pixels by which the border is usually displaced, up to 32, and at most
@@ -323,7 +324,7 @@ typedef struct texsyn_knit_desc {
     texsyn_likeness likeness; /* AUTO with an example of a border: different                      */
     txm_image border;         /* an example of a border between the two textures, in the same light:
                                  channels of a, any size of 16 px or more; pixels NULL = none     */
-    txm_image border_layout;  /* its layout, in the form of layout                                */
+    txm_image border_layout;  /* its layout, of its size                                          */
     int quality;              /* -2 fast .. +2 best: fewer or more clique types and sweeps        */
     uint64_t seed;            /* another seed, another zone                                       */
 } texsyn_knit_desc;
@@ -360,8 +361,8 @@ enum {
 typedef struct texsyn_segment_desc {
     txm_image image; /* 1, 3 or 4 channels, both sides at least 16 px; where alpha is under one half
                         pixels do not take part                                                   */
-    txm_image mask;  /* same size: pixels take part where gray times alpha is at least half;
-                        pixels NULL = all                                                         */
+    txm_image mask;  /* same size: pixels take part where it counts, a mask that allows
+                        (txm_mask_use in texmath.h); pixels NULL = all                            */
     int segments;    /* how many textures, 1..16; 0 = as many as are found, 1 or more             */
     int transition;  /* non-zero: parts thinner than about 13 pixels and specks get
                         TEXSYN_TRANSITION; else they join what is around them. Pixels are those of
@@ -467,9 +468,9 @@ TEXSYN_API txm_status texsyn_composite_layout(const texsyn_composite_desc *desc,
 
 typedef struct texsyn_relight_desc {
     txm_image image;     /* 1 to 4 channels; not modified                                        */
-    txm_image mask;      /* same size: what of it is compared with the other picture, where gray
-                            times alpha is at least half; pixels NULL = everything. Transparent
-                            pixels are never compared                                            */
+    txm_image mask;      /* same size: what of it is compared with the other picture, a mask that
+                            allows (txm_mask_use in texmath.h); pixels NULL = everything.
+                            Transparent pixels are never compared                                */
     txm_image like;      /* a picture in the light that is wanted, of any size                   */
     txm_image like_mask; /* the same for that one                                                */
     float strength;      /* how much of the change is made, up to 1; 0 = 1                       */
@@ -518,8 +519,9 @@ typedef struct texsyn_erosion texsyn_erosion;
 typedef struct texsyn_erosion_desc {
     txm_image weathered; /* at least 32 x 32; its cracks are darker than their surroundings. Not
                             modified, need not outlive the call                                  */
-    txm_image mask;      /* same size: only where gray times alpha is at least half; pixels NULL =
-                            everywhere. Transparent pixels of the exemplar are never used        */
+    txm_image mask;      /* same size: only where it counts, a mask that allows (txm_mask_use in
+                            texmath.h); pixels NULL = everywhere. Transparent pixels of the
+                            exemplar are never used                                              */
     float share;         /* of the pixels that are eroded at level 1, up to 0.5; 0 = 0.1         */
     int width, height;   /* of the pictures to be eroded, 1 or more each                         */
     uint64_t seed;       /* another seed, other cracks                                           */
@@ -679,16 +681,6 @@ static void txs_copy_picture(const txm_image *from, const txm_image *to) {
         memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
 }
 
-/* gray times alpha is at least half: the rule for masks */
-static int txs_is_white(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    double v = (double)txm_image_get(&m, x, y, 0);
-    if (m.channels >= 3)
-        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
-    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
-    return v >= 0.5;
-}
-
 /* no float sample is NaN or larger than LIMITS says */
 static int txs_image_is_moderate(const txm_image *image) {
     const txm_image im = txm_image_resolve(*image);
@@ -700,16 +692,21 @@ static int txs_image_is_moderate(const txm_image *image) {
     return 1;
 }
 
+/* A mask that may be left out, of a picture. */
 static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
                                  txm_env *env) {
     if (!mask->pixels) return TXM_OK;
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name, "must be # x # like its picture",
-                                   (uint64_t)image->width, (uint64_t)image->height);
-    if (!txm_image_is_finite(mask))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
+    return txm_mask_check(mask, name, image->width, image->height, TEXSYN_MAX_PIXELS, env);
+}
+
+/* The bytes of a mask of what may be used, 255 where it counts; *bytes is NULL without a mask. */
+static txm_status txs_read_mask(const txm_image *mask, txm_arena *arena, uint8_t **bytes,
+                                txm_env *env) {
+    *bytes = NULL;
+    if (!mask->pixels) return TXM_OK;
+    *bytes = (uint8_t *)txm_arena_alloc(arena, txs_pixels_of(mask->width, mask->height), 1);
+    if (!*bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mask");
+    txm_mask_read(mask, TXM_MASK_ALLOWS, *bytes);
     return TXM_OK;
 }
 
@@ -3542,14 +3539,7 @@ static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
         return txm_fail(env, TXM_TOO_SMALL, "example: both sides must be at least 16 pixels");
     if (!txs_image_is_moderate(&d->example))
         return txm_fail(env, TXM_BAD_ARGUMENT, "example: a sample is NaN or beyond a million");
-    if (d->mask.pixels) {
-        if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
-            return status;
-        if (d->mask.width != d->example.width || d->mask.height != d->example.height)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must be as large as the example");
-        if (d->mask.channels > 1 || d->mask.sample != TXM_U8)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must have one 8-bit channel");
-    }
+    if ((status = txs_check_mask(&d->mask, &d->example, "mask", env)) != TXM_OK) return status;
     if (d->max_distance < 0 || d->max_distance == 1 || d->max_distance > TXS_MAX_REACH)
         return txm_fail(env, TXM_BAD_ARGUMENT, "max_distance must be 2 to 60, or 0");
     if (d->max_types < 0 || d->max_types > 60)
@@ -3614,14 +3604,10 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels + 1);
         if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
-            for (int y = 0; y < s->height && s->mask; y++)
-                memcpy(s->mask + (size_t)y * (size_t)s->width, txm_image_row_const(&desc->mask, y),
-                       (size_t)s->width);
-            size_t seen = 0;
-            for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
-            if (s->mask && seen < 256)
+            if (s->mask && txm_mask_read(&desc->mask, TXM_MASK_ALLOWS, s->mask) < 256)
                 return txm_fail(env, TXM_TOO_SMALL,
-                                "mask: fewer than 256 pixels (16 x 16) are not 0");
+                                "mask: fewer than 256 pixels (16 x 16) count; they do where gray "
+                                "times alpha is at least half");
             if (!txs_split_visible(m, im, s, arena))
                 return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         } else {
@@ -5870,26 +5856,6 @@ typedef struct txs_filler {
 
 /* ---- checks --------------------------------------------------------------------------- */
 
-/* Is the mask set here? Gray times alpha is at least half of its range. */
-static int txs_mask_at(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    const uint8_t *p = (const uint8_t *)txm_image_row_const(&m, y) + (size_t)x * (size_t)m.channels;
-    const int alpha = m.channels == 2 ? p[1] : m.channels == 4 ? p[3] : 255;
-    const int gray = m.channels < 3 ? p[0] : (54 * p[0] + 183 * p[1] + 19 * p[2] + 128) / 256;
-    return 2 * gray * alpha >= 255 * 255;
-}
-
-static txm_status txs_fill_check_mask(const txm_image *mask, const char *name,
-                                      const txm_image *image, txm_env *env) {
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->sample != TXM_U8)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must have 8-bit samples");
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be as large as the image");
-    return TXM_OK;
-}
-
 static txm_status txs_fill_check(const texsyn_fill_desc *d, const txm_image *out, txm_env *env) {
     txm_status status;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "fill: desc is NULL");
@@ -5897,10 +5863,9 @@ static txm_status txs_fill_check(const texsyn_fill_desc *d, const txm_image *out
         return status;
     const int channels = d->image.channels ? d->image.channels : 1;
     if (channels == 2) return txm_fail(env, TXM_BAD_ARGUMENT, "image: 2 channels; give 1, 3 or 4");
-    if ((status = txs_fill_check_mask(&d->mask, "mask", &d->image, env)) != TXM_OK) return status;
-    if (d->source.pixels &&
-        (status = txs_fill_check_mask(&d->source, "source", &d->image, env)) != TXM_OK)
-        return status;
+    if (!d->mask.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "mask: pixels is NULL");
+    if ((status = txs_check_mask(&d->mask, &d->image, "mask", env)) != TXM_OK) return status;
+    if ((status = txs_check_mask(&d->source, &d->image, "source", env)) != TXM_OK) return status;
     if (d->model && d->model->channels != channels)
         return txm_fail(env, TXM_BAD_ARGUMENT, "model: must have the channels of the image");
     if (d->quality < -2 || d->quality > 2)
@@ -5936,12 +5901,18 @@ static txm_status txs_fill_open(txs_filler *f, txm_arena *arena, txm_env *env) {
     f->image = txm_image_resolve(f->image);
     f->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the picture");
+    uint8_t *source;
+    const txm_status status = txs_read_mask(&d->source, arena, &source, env);
+    if (status != TXM_OK) return status;
     txs_copy_picture(&im, &f->image);
+    txm_mask_read(&d->mask, TXM_MASK_REPLACES, f->state);
     for (int y = 0; y < im.height; y++) {
         for (int x = 0; x < im.width; x++) {
-            uint8_t *state = &f->state[(size_t)y * (size_t)im.width + (size_t)x];
-            const int is_source = !d->source.pixels || txs_mask_at(&d->source, x, y);
-            *state = txs_mask_at(&d->mask, x, y) ? TXS_FREE : is_source ? TXS_SOURCE : TXS_KNOWN;
+            const size_t i = (size_t)y * (size_t)im.width + (size_t)x;
+            uint8_t *state = &f->state[i];
+            *state = (uint8_t)(*state                   ? TXS_FREE
+                               : !source || source[i] ? TXS_SOURCE
+                                                      : TXS_KNOWN);
             f->missing += *state == TXS_FREE;
             f->source += *state == TXS_SOURCE;
             if (*state != TXS_FREE && !txs_fill_is_sound(&im, x, y))
@@ -5950,7 +5921,7 @@ static txm_status txs_fill_open(txs_filler *f, txm_arena *arena, txm_env *env) {
         }
     }
     if (!f->missing)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "mask: is empty; white is what is to be filled");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "mask: is empty, nothing of it is at least half white; white is what is to be filled");
     if ((size_t)f->missing == pixels)
         return txm_fail(env, TXM_BAD_ARGUMENT, "mask: covers the whole picture; nothing is known");
     if (f->source < TXS_FILL_FEW)
@@ -7090,7 +7061,9 @@ static txm_status txs_knit_check_border(const texsyn_knit_desc *d, txm_env *env)
     if (status != TXM_OK) return status;
     if (txs_channels_of(&d->border) != txs_channels_of(&d->a))
         return txm_fail(env, TXM_BAD_ARGUMENT, "border: must have the channels of a");
-    return txs_fill_check_mask(&d->border_layout, "border_layout", &d->border, env);
+    if (!d->border_layout.pixels)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "border_layout: pixels is NULL");
+    return txs_check_mask(&d->border_layout, &d->border, "border_layout", env);
 }
 
 static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out, txm_env *env) {
@@ -7101,7 +7074,8 @@ static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out
         return status;
     if (txs_channels_of(&d->b) != txs_channels_of(&d->a) || d->b.sample != d->a.sample)
         return txm_fail(env, TXM_BAD_ARGUMENT, "b: must have the channels and samples of a");
-    if ((status = txs_fill_check_mask(&d->layout, "layout", &d->a, env)) != TXM_OK) return status;
+    if (!d->layout.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "layout: pixels is NULL");
+    if ((status = txs_check_mask(&d->layout, &d->a, "layout", env)) != TXM_OK) return status;
     if (d->border.pixels && (status = txs_knit_check_border(d, env)) != TXM_OK) return status;
     if (d->zone < 0 || d->zone > TXS_KNIT_MOST)
         return txm_fail(env, TXM_BAD_ARGUMENT, "zone must be 1 to 64, or 0 for the default");
@@ -7123,14 +7097,9 @@ static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out
 
 /* Read a layout; returns how many pixels are white. */
 static size_t txs_knit_read(const txm_image *layout, uint8_t *label) {
-    size_t white = 0;
-    for (int y = 0; y < layout->height; y++) {
-        for (int x = 0; x < layout->width; x++) {
-            const int is_white = txs_mask_at(layout, x, y);
-            label[(size_t)y * (size_t)layout->width + (size_t)x] = (uint8_t)is_white;
-            white += (size_t)is_white;
-        }
-    }
+    const size_t pixels = txs_pixels_of(layout->width, layout->height);
+    const size_t white = txm_mask_read(layout, TXM_MASK_DIVIDES, label);
+    for (size_t i = 0; i < pixels; i++) label[i] = label[i] != 0;
     return white;
 }
 
@@ -7757,22 +7726,15 @@ static int txs_sample_code(const txm_image *im, int x, int y, int c) {
 
 /* ---- the picture at working resolution ------------------------------------------------------ */
 
-/* Does the pixel take part? By the mask, where there is one, and by its own alpha. */
-static int txs_takes_part(const txm_image *im, const txm_image *mask, int x, int y) {
+/* Does the pixel take part? By the bytes of the mask, where there is one, and by its own alpha. */
+static int txs_takes_part(const txm_image *im, const uint8_t *mask, int x, int y) {
     const int alpha = im->channels == 2 || im->channels == 4;
     if (alpha && txs_sample_code(im, x, y, im->channels - 1) < TXS_CODES / 2) return 0;
-    if (!mask->pixels) return 1;
-    int gray = 0;
-    const int colours = mask->channels < 3 ? 1 : 3;
-    for (int c = 0; c < colours; c++) gray += txs_sample_code(mask, x, y, c);
-    gray /= colours;
-    if (mask->channels == 2 || mask->channels == 4)
-        gray = gray * txs_sample_code(mask, x, y, mask->channels - 1) / TXS_CODES;
-    return gray >= TXS_CODES / 2;
+    return !mask || mask[(size_t)y * (size_t)im->width + (size_t)x];
 }
 
 /* One pixel of the scene: the mean of those of its square that take part, weighted by alpha. */
-static void txs_reduce(txs_scene *s, const txm_image *im, const txm_image *mask,
+static void txs_reduce(txs_scene *s, const txm_image *im, const uint8_t *mask,
                        const txs_colours *tables, int x, int y) {
     const int f = s->factor, colours = im->channels < 3 ? 1 : 3;
     const int right = txm_clampi((x + 1) * f, 0, im->width);
@@ -8777,6 +8739,7 @@ typedef struct txs_segmenter {
     txs_partition partition;
     txs_refiner refiner;
     uint32_t *nearest; /* of each pixel of the scene the counted one nearest to it */
+    uint8_t *mask;     /* of each pixel of the picture; NULL: all take part         */
 } txs_segmenter;
 
 /* Steps to the nearest counted pixel, by two passes; its index for each pixel. */
@@ -8810,7 +8773,8 @@ static txm_status txs_no_memory_to_segment(txm_env *env) {
 
 typedef struct txs_reducer {
     txs_scene *scene;
-    txm_image image, mask;
+    txm_image image;
+    const uint8_t *mask;
     const txs_colours *tables;
 } txs_reducer;
 
@@ -8820,17 +8784,17 @@ static void txs_reduce_rows(void *context, int share) {
     const int from = (int)((int64_t)s->height * share / TXS_TASKS);
     const int to = (int)((int64_t)s->height * (share + 1) / TXS_TASKS);
     for (int y = from; y < to; y++)
-        for (int x = 0; x < s->width; x++) txs_reduce(s, &r->image, &r->mask, r->tables, x, y);
+        for (int x = 0; x < s->width; x++) txs_reduce(s, &r->image, r->mask, r->tables, x, y);
 }
 
 /* Do enough pixels take part? */
-static txm_status txs_check_counted(const txs_segmenter *g, txm_image image, txm_image mask) {
+static txm_status txs_check_counted(const txs_segmenter *g, txm_image image) {
     const txs_scene *s = &g->scene;
     size_t whole = 0, counted = 0;
     for (size_t i = 0; i < s->pixels; i++) whole += s->counted[i];
     for (int y = 0; y < image.height && counted < TXS_LEAST_COUNTED; y++)
         for (int x = 0; x < image.width; x++)
-            counted += (size_t)txs_takes_part(&image, &mask, x, y);
+            counted += (size_t)txs_takes_part(&image, g->mask, x, y);
     if (counted >= TXS_LEAST_COUNTED && whole > 0) return TXM_OK;
     return txm_fail(g->env, TXM_TOO_SMALL,
                     "fewer than 256 pixels (16 x 16) take part, by mask and alpha");
@@ -8866,10 +8830,9 @@ static txm_status txs_see_scene(txs_segmenter *g) {
         status = txs_no_memory_to_segment(g->env);
     } else {
         txs_colour_tables(tables);
-        txs_reducer r = {s, txm_image_resolve(*im), g->desc->mask, tables};
-        if (r.mask.pixels) r.mask = txm_image_resolve(r.mask);
+        txs_reducer r = {s, txm_image_resolve(*im), g->mask, tables};
         txm_parallel_for(g->env, TXS_TASKS, txs_reduce_rows, &r);
-        status = txs_check_counted(g, r.image, r.mask);
+        status = txs_check_counted(g, r.image);
     }
     if (status == TXM_OK) {
         txs_find_nearest(s, g->nearest, steps);
@@ -9130,14 +9093,13 @@ static void txs_write_labels(void *context, int share) {
     const txs_writer *w = (const txs_writer *)context;
     const txs_scene *s = &w->job->scene;
     const txm_image im = txm_image_resolve(w->job->desc->image), *out = w->out;
-    txm_image mask = w->job->desc->mask;
-    if (mask.pixels) mask = txm_image_resolve(mask);
+    const uint8_t *mask = w->job->mask;
     const int from = (int)((int64_t)out->height * share / TXS_TASKS);
     const int to = (int)((int64_t)out->height * (share + 1) / TXS_TASKS);
     for (int y = from; y < to; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(out, y);
         for (int x = 0; x < out->width; x++)
-            row[x] = txs_takes_part(&im, &mask, x, y) ? txs_vote(s, w->job->refiner.label, x, y)
+            row[x] = txs_takes_part(&im, mask, x, y) ? txs_vote(s, w->job->refiner.label, x, y)
                                                       : (uint8_t)TEXSYN_NO_LABEL;
     }
 }
@@ -9156,12 +9118,7 @@ static txm_status txs_segment_check(const texsyn_segment_desc *d, const txm_imag
         return txm_fail(env, TXM_TOO_SMALL, "image: both sides must be at least 16 pixels");
     if (!txs_image_is_moderate(&d->image))
         return txm_fail(env, TXM_BAD_ARGUMENT, "image: a sample is NaN or beyond a million");
-    if (d->mask.pixels) {
-        if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
-            return status;
-        if (d->mask.width != d->image.width || d->mask.height != d->image.height)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must be as large as the image");
-    }
+    if ((status = txs_check_mask(&d->mask, &d->image, "mask", env)) != TXM_OK) return status;
     if (d->segments < 0 || d->segments > TEXSYN_MAX_SEGMENTS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "segments must be 1 to 16, or 0");
     if ((status = txm_image_check(out, "out", 0, env)) != TXM_OK) return status;
@@ -9186,7 +9143,8 @@ TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *e
     g.desc = desc;
     g.env = env;
     txm_arena_init(&g.arena, env);
-    status = txs_see_scene(&g);
+    status = txs_read_mask(&desc->mask, &g.arena, &g.mask, env);
+    if (status == TXM_OK) status = txs_see_scene(&g);
     if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_TEXTONS, "textons");
     if (status == TXM_OK) status = txs_make_textons(&g);
     if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_REGIONS, "regions");
@@ -11519,17 +11477,20 @@ static txm_status txs_choose_light(txs_lighting *w, txm_env *env, texsyn_light *
     return TXM_OK;
 }
 
-static int txs_counts(const txm_image *im, const txm_image *mask, int x, int y) {
-    if (mask->pixels && !txs_is_white(mask, x, y)) return 0;
+static int txs_counts(const txm_image *im, const uint8_t *mask, int x, int y) {
+    if (mask && !mask[(size_t)y * (size_t)im->width + (size_t)x]) return 0;
     return im->channels % 2 == 1 || txm_image_get(im, x, y, im->channels - 1) >= 0.5f;
 }
 
 /* Samples of the pixels that count, evenly spread over them but at random within each stretch. */
-static txm_status txs_take_swatches(const txm_image *image, const txm_image *mask, const char *name,
+static txm_status txs_take_swatches(const txm_image *image, const txm_image *where, const char *name,
                                     txm_arena *arena, txs_swatches *s, txs_cloud *cloud,
                                     txm_env *env) {
     const txm_image im = txm_image_resolve(*image);
     int64_t total = 0, seen = 0;
+    uint8_t *mask;
+    const txm_status status = txs_read_mask(where, arena, &mask, env);
+    if (status != TXM_OK) return status;
     for (int y = 0; y < im.height; y++)
         for (int x = 0; x < im.width; x++) total += txs_counts(&im, mask, x, y);
     if (total < TXS_LEAST_SWATCHES)
@@ -12497,12 +12458,14 @@ static txm_status txs_check_erosion(const texsyn_erosion_desc *d, txm_env *env) 
 /* How many pixels are known: opaque and in the mask. */
 static size_t txs_find_known(txs_stone *s, const txm_image *im, const txm_image *mask) {
     size_t count = 0;
+    if (mask->pixels) txm_mask_read(mask, TXM_MASK_ALLOWS, s->known);
     for (int y = 0; y < s->height; y++) {
         for (int x = 0; x < s->width; x++) {
-            int ok = !mask->pixels || txs_is_white(mask, x, y);
+            uint8_t *known = &s->known[(size_t)y * (size_t)s->width + (size_t)x];
+            int ok = !mask->pixels || *known;
             if (im->channels % 2 == 0)
                 ok = ok && txm_image_get(im, x, y, im->channels - 1) >= 0.5f;
-            s->known[(size_t)y * (size_t)s->width + (size_t)x] = (uint8_t)ok;
+            *known = (uint8_t)ok;
             count += (size_t)ok;
         }
     }

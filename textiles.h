@@ -4657,7 +4657,7 @@ static void txt_repair_tile(const txt_canvas *c, txt_repair *r) {
             for (int v = txm_clampi(y - reach, 0, side); v < txm_clampi(y + reach + 2, 0, side); v++) {
                 for (int u = txm_clampi(x - reach, 0, side); u < txm_clampi(x + reach + 2, 0, side); u++) {
                     const int q = v * side + u;
-                    if (c->inside[q] && !c->locked[q]) r->mask[q] = 1, any = 1;
+                    if (c->inside[q] && !c->locked[q]) r->mask[q] = 255, any = 1;
                 }
             }
         }

@@ -182,9 +182,9 @@ typedef struct texinpaint_line {
    they, the maps, the lines and the mesh must live as long as the job. */
 typedef struct texinpaint_desc {
     txm_image image;  /* the picture, or the texture of the mesh: 1..4 channels, any sample type */
-    txm_image mask;   /* same size, TXM_U8; missing where gray is 128 or more (RGB counts as 0.21,
-                         0.72, 0.07); with alpha: gray times alpha, half of its range or more   */
-    txm_image source; /* same size and form as mask: where texture may be taken from; pixels NULL:
+    txm_image mask;   /* same size: missing where it counts, a mask that replaces (txm_mask_use in
+                         texmath.h): gray times alpha of at least half, and its soft rim         */
+    txm_image source; /* same size: where texture may be taken from, a mask that allows; pixels NULL:
                          from all that is known                                                  */
     const texinpaint_map *maps; /* further maps in register, completed along with the picture    */
     int map_count;              /* 0..TEXINPAINT_MAX_MAPS - 1                                    */

@@ -28,7 +28,7 @@
          desc.mask.sample = TXM_U8;
          for (int y = 0; y < 64; y++) {
              for (int x = 0; x < 64; x++) {
-                 hole[64 * y + x] = x >= 16 && x < 48 && y >= 16 && y < 48;
+                 hole[64 * y + x] = x >= 16 && x < 48 && y >= 16 && y < 48 ? 255 : 0;
                  txm_image_set(&desc.image, x, y, 0, hole[64 * y + x] ? 0.0f : (float)x / 63.0f);
              }
          }
@@ -47,6 +47,8 @@
    CONVENTIONS
      Right-handed space. Angles are in radians. A quaternion (x, y, z, w) has its scalar last, as in
      glTF. Image rows go from top to bottom, x to the right.
+     Masks are pictures of any form: gray times alpha, and what is at least half of its range counts.
+     txm_mask_use tells the whole rule, which all headers of the suite keep.
 
    MEMORY
      Nine functions allocate, all through the environment: txm_alloc, txm_arena_alloc,
@@ -100,6 +102,7 @@ extern "C" {
 #include "texmath/env.h"
 #include "texmath/number.h"
 #include "texmath/image.h"
+#include "texmath/mask.h"
 #include "texmath/alpha.h"
 #include "texmath/level.h"
 #include "texmath/light.h"

@@ -161,7 +161,8 @@ typedef struct texpatch_exemplar {
     const txm_image *maps; /* map_count pictures of one size; every exemplar has the same maps:
                               channels and sample type                                       */
     txm_image guide;       /* its guide, the size of the maps, 1..4 channels; pixels NULL: none */
-    txm_image mask;        /* TXM_U8, 1 channel: 0 = never use this pixel; pixels NULL: use all */
+    txm_image mask;        /* the size of the maps: a mask that allows (txm_mask_use in texmath.h):
+                              pixels that do not count are never used; pixels NULL: use all      */
 } texpatch_exemplar;
 
 enum { TEXPATCH_TILE_X = 1, TEXPATCH_TILE_Y = 2 }; /* for texpatch_desc.tileable               */
@@ -188,13 +189,13 @@ typedef struct texpatch_desc {
     float lattice_vectors[4]; /* for lattice = 1: x and y of both steps, in pixels                */
     txm_image guide;    /* what the exemplars' guides should look like in the output: width x
                            height, with their channels and sample type; pixels NULL: none        */
-    txm_image guide_mask; /* TXM_U8, 1 channel, width x height: 0 = the guide does not count here;
-                           pixels NULL: it counts everywhere                                     */
+    txm_image guide_mask; /* width x height: a mask that allows, of where the guide counts;
+                           pixels NULL: everywhere                                               */
     float guide_weight; /* 0..16: how much differences in the guide count, relative to a map of
                            weight 1; 0 = 2                                                       */
-    const txm_image *kept; /* map_count pictures of width x height, kept where keep is non-zero;
+    const txm_image *kept; /* map_count pictures of width x height, kept where keep counts;
                            NULL: none. They need not come from the exemplar                      */
-    txm_image keep;        /* TXM_U8, 1 channel, width x height                                  */
+    txm_image keep;        /* width x height: a mask that allows                                 */
     uint64_t seed;         /* another seed gives another texture                                 */
 } texpatch_desc;
 
@@ -244,8 +245,7 @@ typedef struct texpatch_source {
 } texpatch_source;
 TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
 
-/* Synthesise a part again: the pixels where `again` is non-zero (TXM_U8, 1 channel, the size of the
-   output). Any remaining steps are done first. All other pixels are kept, and the part is fitted to
+/* Synthesise a part again: the pixels of `again`, a mask that replaces, of the size of the output. Any remaining steps are done first. All other pixels are kept, and the part is fitted to
    them. The following steps do the work, in time proportional to the part's bounding box.
    guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = unchanged */
 TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,

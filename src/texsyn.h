@@ -157,7 +157,8 @@ typedef struct texsyn_model texsyn_model;
 typedef struct texsyn_learn_desc {
     txm_image example; /* 1, 3 or 4 channels, both sides at least 16 px; not modified, need not
                           outlive the call                                                       */
-    txm_image mask;    /* same size, 1 channel: learn where it is not 0; pixels NULL = everywhere */
+    txm_image mask;    /* same size: learn where it counts, a mask that allows (txm_mask_use in
+                          texmath.h); pixels NULL = everywhere                                   */
     int max_distance;  /* longest pair in pixels of the example, 2..60; 0 = 40. Levels other than
                           the coarsest use pairs of at most 10 of their pixels                   */
     int max_types;     /* clique types per pyramid level beyond the preselected, 1..60; 0 = 24, or
@@ -275,9 +276,9 @@ TEXSYN_API void texsyn_free(texsyn_job *job);
 
 typedef struct texsyn_fill_desc {
     txm_image image;  /* 1, 3 or 4 channels, any sample type; not modified                       */
-    txm_image mask;   /* same size, TXM_U8; 1 channel: filled where 128 or more; more channels:
-                         where gray times alpha is at least half of its range. Any shape, anywhere */
-    txm_image source; /* same size and form as mask: where to learn from; pixels NULL = from all
+    txm_image mask;   /* same size: filled where it counts, a mask that replaces (txm_mask_use in
+                         texmath.h). Any shape, anywhere                                         */
+    txm_image source; /* same size: where to learn from, a mask that allows; pixels NULL = from all
                          that is known near the hole                                             */
     const texsyn_model *model; /* what to fill with, of as many channels; NULL = learn it        */
     int relight;               /* non-zero: such a model gets the mean colour and the contrast of
@@ -313,8 +314,8 @@ typedef struct texsyn_knit_desc {
     txm_image a;        /* 1, 3 or 4 channels, any sample type, sides of 16 px or more; not modified */
     txm_image b;        /* the same channels and sample type; of any size of 16 px or more: where it
                            ends it goes on reflected                                              */
-    txm_image layout;   /* size of a, TXM_U8; b where 128 or more (with more channels: where gray
-                           times alpha is at least half of its range), a elsewhere. Any shape     */
+    txm_image layout;   /* size of a: b where it counts, a elsewhere, a mask that divides
+                           (txm_mask_use in texmath.h). Any shape                                 */
     int zone;           /* pixels on either side of the border that are synthesised, 1..64; 0 = 3
                            for pictures of the same texture, 6 for different ones                 */
     float roughness;    /* pixels by which the border is usually displaced, up to 32, and at most
@@ -323,7 +324,7 @@ typedef struct texsyn_knit_desc {
     texsyn_likeness likeness; /* AUTO with an example of a border: different                      */
     txm_image border;         /* an example of a border between the two textures, in the same light:
                                  channels of a, any size of 16 px or more; pixels NULL = none     */
-    txm_image border_layout;  /* its layout, in the form of layout                                */
+    txm_image border_layout;  /* its layout, of its size                                          */
     int quality;              /* -2 fast .. +2 best: fewer or more clique types and sweeps        */
     uint64_t seed;            /* another seed, another zone                                       */
 } texsyn_knit_desc;
@@ -360,8 +361,8 @@ enum {
 typedef struct texsyn_segment_desc {
     txm_image image; /* 1, 3 or 4 channels, both sides at least 16 px; where alpha is under one half
                         pixels do not take part                                                   */
-    txm_image mask;  /* same size: pixels take part where gray times alpha is at least half;
-                        pixels NULL = all                                                         */
+    txm_image mask;  /* same size: pixels take part where it counts, a mask that allows
+                        (txm_mask_use in texmath.h); pixels NULL = all                            */
     int segments;    /* how many textures, 1..16; 0 = as many as are found, 1 or more             */
     int transition;  /* non-zero: parts thinner than about 13 pixels and specks get
                         TEXSYN_TRANSITION; else they join what is around them. Pixels are those of
@@ -467,9 +468,9 @@ TEXSYN_API txm_status texsyn_composite_layout(const texsyn_composite_desc *desc,
 
 typedef struct texsyn_relight_desc {
     txm_image image;     /* 1 to 4 channels; not modified                                        */
-    txm_image mask;      /* same size: what of it is compared with the other picture, where gray
-                            times alpha is at least half; pixels NULL = everything. Transparent
-                            pixels are never compared                                            */
+    txm_image mask;      /* same size: what of it is compared with the other picture, a mask that
+                            allows (txm_mask_use in texmath.h); pixels NULL = everything.
+                            Transparent pixels are never compared                                */
     txm_image like;      /* a picture in the light that is wanted, of any size                   */
     txm_image like_mask; /* the same for that one                                                */
     float strength;      /* how much of the change is made, up to 1; 0 = 1                       */
@@ -518,8 +519,9 @@ typedef struct texsyn_erosion texsyn_erosion;
 typedef struct texsyn_erosion_desc {
     txm_image weathered; /* at least 32 x 32; its cracks are darker than their surroundings. Not
                             modified, need not outlive the call                                  */
-    txm_image mask;      /* same size: only where gray times alpha is at least half; pixels NULL =
-                            everywhere. Transparent pixels of the exemplar are never used        */
+    txm_image mask;      /* same size: only where it counts, a mask that allows (txm_mask_use in
+                            texmath.h); pixels NULL = everywhere. Transparent pixels of the
+                            exemplar are never used                                              */
     float share;         /* of the pixels that are eroded at level 1, up to 0.5; 0 = 0.1         */
     int width, height;   /* of the pictures to be eroded, 1 or more each                         */
     uint64_t seed;       /* another seed, other cracks                                           */

@@ -42,10 +42,7 @@ static txm_status txi_check_picture(const txm_image *im, const char *name, const
 
 static txm_status txi_check_mask(const txm_image *im, const char *name, const txm_image *like,
                                  txm_env *env) {
-    const txm_status status = txi_check_picture(im, name, like, env);
-    if (status == TXM_OK && im->sample != TXM_U8)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be TXM_U8");
-    return status;
+    return txm_mask_check(im, name, like->width, like->height, TEXINPAINT_MAX_PIXELS, env);
 }
 
 static txm_status txi_check_maps(const texinpaint_desc *d, txm_env *env) {
@@ -155,15 +152,6 @@ static txm_status txi_check_outputs(const texinpaint_desc *d, const txm_image *o
 
 /* ---- the domain ---------------------------------------------------------------------------- */
 
-/* Is the mask set here? Gray times alpha is at least half of its range. */
-static int txi_mask_at(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    const uint8_t *p = (const uint8_t *)txm_image_row_const(&m, y) + (size_t)x * (size_t)m.channels;
-    const int alpha = m.channels == 2 ? p[1] : m.channels == 4 ? p[3] : 255;
-    const int gray = m.channels < 3 ? p[0] : (54 * p[0] + 183 * p[1] + 19 * p[2] + 128) / 256;
-    return 2 * gray * alpha >= 255 * 255;
-}
-
 /* Copy samples between pictures of one form. */
 static void txi_copy_picture(const txm_image *from, const txm_image *to) {
     const txm_image a = txm_image_resolve(*from), b = txm_image_resolve(*to);
@@ -195,13 +183,11 @@ static txm_status txi_domain_make(txi_domain *domain, const texinpaint_desc *des
     domain->missing = (uint8_t *)txm_arena_zero(arena, count, 1);
     domain->usable = (uint8_t *)txm_arena_zero(arena, count, 1);
     if (arena->failed) return txi_no_memory(env);
-    for (int y = 0; y < domain->height; y++) {
-        for (int x = 0; x < domain->width; x++) {
-            const size_t i = (size_t)y * (size_t)domain->width + (size_t)x;
-            domain->missing[i] = desc->mask.pixels && txi_mask_at(&desc->mask, x, y);
-            domain->usable[i] = !domain->missing[i] &&
-                                (!desc->source.pixels || txi_mask_at(&desc->source, x, y));
-        }
+    if (desc->mask.pixels) txm_mask_read(&desc->mask, TXM_MASK_REPLACES, domain->missing);
+    if (desc->source.pixels) txm_mask_read(&desc->source, TXM_MASK_ALLOWS, domain->usable);
+    for (size_t i = 0; i < count; i++) {
+        domain->missing[i] = domain->missing[i] != 0;
+        domain->usable[i] = !domain->missing[i] && (!desc->source.pixels || domain->usable[i]);
     }
     return TXM_OK;
 }

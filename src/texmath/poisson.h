@@ -1,14 +1,14 @@
 #ifndef TEXMATH_POISSON_H
 #define TEXMATH_POISSON_H
 
-#include "image.h"
+#include "mask.h"
 
 /* ---- kernel: Poisson equation ----------------------------------------------------------- */
 
 typedef struct txm_poisson_desc {
     txm_image image;    /* TXM_F32, finite. In: known values outside the mask, a first guess
                            inside. Out: the solution inside; untouched after an error       */
-    txm_image mask;     /* TXM_U8, 1 channel, same size: non-zero = unknown                 */
+    txm_image mask;     /* same size: unknown where it counts, see txm_mask_at              */
     txm_image target;   /* TXM_F32, size and channels of image: target Laplacian; NULL = 0  */
     float screen;       /* 0..1e6: pull towards the first guess; 0 = none                   */
     float tolerance;    /* relative residual to stop at, 1e-12..1; 0 = 1e-6                 */
@@ -120,10 +120,9 @@ static inline void txm_poisson_link(txm_poisson_grid *g, const txm_image *mask, 
     size_t i = 0;
     for (int x = 0; x < width; x++) above[x] = -1;
     for (int y = 0; y < height; y++) {
-        const uint8_t *row = (const uint8_t *)txm_image_row_const(mask, y);
         int32_t left = -1;
         for (int x = 0; x < width; x++) {
-            const int32_t up = above[x], me = row[x] ? (int32_t)i : -1;
+            const int32_t up = above[x], me = txm_mask_at(mask, x, y) ? (int32_t)i : -1;
             if (me >= 0) {
                 g->side[0][i] = left;
                 g->side[1][i] = -1;
@@ -153,9 +152,8 @@ static inline void txm_poisson_load(const txm_poisson_grid *g, const txm_poisson
     const int width = image->width, height = image->height;
     size_t i = 0;
     for (int y = 0; y < height; y++) {
-        const uint8_t *row = (const uint8_t *)txm_image_row_const(&desc->mask, y);
         for (int x = 0; x < width; x++) {
-            if (!row[x]) continue;
+            if (!txm_mask_at(&desc->mask, x, y)) continue;
             double b = (double)desc->screen * txm_image_get(image, x, y, c);
             if (desc->target.pixels) b -= txm_image_get(&desc->target, x, y, c);
             if (x > 0 && g->side[0][i] < 0) b += txm_image_get(image, x - 1, y, c);
@@ -173,16 +171,13 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
                                            txm_env *env) {
     const txm_image *image = &desc->image, *mask = &desc->mask, *target = &desc->target;
     txm_status status = txm_image_check(image, "image", 0, env);
-    if (status == TXM_OK) status = txm_image_check(mask, "mask", 0, env);
+    if (status == TXM_OK)
+        status = txm_mask_check(mask, "mask", image->width, image->height, 0, env);
     if (status == TXM_OK && target->pixels) status = txm_image_check(target, "target", 0, env);
     if (status != TXM_OK) return status;
     if (image->sample != TXM_F32 || !txm_image_is_finite(image))
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "image",
                            "samples must be TXM_F32 and finite, in the hole too");
-    if (mask->sample != TXM_U8 || mask->channels > 1 || mask->width != image->width ||
-        mask->height != image->height)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "mask",
-                           "must be TXM_U8 with 1 channel and the size of image");
     if (target->pixels &&
         (target->sample != TXM_F32 || target->width != image->width ||
          target->height != image->height || !txm_image_is_finite(target) ||
@@ -201,8 +196,7 @@ static inline txm_status txm_poisson_check(const txm_poisson_desc *desc, size_t 
         return txm_fail(env, TXM_BAD_ARGUMENT, "progress_from..progress_to must lie in 0..1");
     *unknown = 0;
     for (int y = 0; y < mask->height; y++) {
-        const uint8_t *row = (const uint8_t *)txm_image_row_const(mask, y);
-        for (int x = 0; x < mask->width; x++) *unknown += row[x] != 0;
+        for (int x = 0; x < mask->width; x++) *unknown += (size_t)txm_mask_at(mask, x, y);
     }
     if (*unknown > INT32_MAX)
         return txm_fail_at(env, TXM_TOO_LARGE, "mask",
@@ -269,10 +263,9 @@ static inline txm_status txm_poisson(const txm_poisson_desc *desc, txm_env *env)
         for (size_t i = 0; i < n; i++) result[i * channels + (size_t)c] = txm_float(g.x[i]);
     }
     for (int y = 0, i = 0; y < image.height; y++) {
-        const uint8_t *row = (const uint8_t *)txm_image_row_const(&desc->mask, y);
         float *out = (float *)txm_image_row(&image, y);
         for (int x = 0; x < image.width; x++) {
-            if (!row[x]) continue;
+            if (!txm_mask_at(&desc->mask, x, y)) continue;
             memcpy(out + (size_t)x * channels, result + (size_t)i++ * channels,
                    channels * sizeof(float));
         }

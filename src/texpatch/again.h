@@ -6,10 +6,10 @@
 /* ---- a part made again ------------------------------------------------------------------ */
 
 /* Is pixel (x, y) of the canvas in the part? The margin is where the border is. */
-static inline int txp_is_in_part(const texpatch_job *job, const txm_image *again, int x, int y) {
+static inline int txp_is_in_part(const texpatch_job *job, const uint8_t *again, int x, int y) {
     x = txm_clampi(x - job->margin_x, 0, job->setup.width - 1);
     y = txm_clampi(y - job->margin_y, 0, job->setup.height - 1);
-    return ((const uint8_t *)txm_image_row_const(again, y))[x] != 0;
+    return again[(size_t)y * (size_t)job->setup.width + (size_t)x] != 0;
 }
 
 /* One axis of the box around a part: with context, large enough for the coarsest level and in steps
@@ -44,10 +44,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                                        const txm_image *guide, const txm_image *guide_mask,
                                        uint64_t seed, txm_env *env) {
     txm_status status;
-    txm_arena memory;
+    txm_arena memory, masks;
+    uint8_t *mask, *counts;
     txp_given new_guide;
     txp_origins from;
-    txm_image mask, no_mask;
     int low_x, low_y, high_x = -1, high_y = -1;
     int x0 = 0, y0 = 0, wide = 0, high = 0;
     if (!job || !again) return txm_fail(env, TXM_BAD_ARGUMENT, "job or again is NULL");
@@ -55,9 +55,8 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     const txp_setup *u = &job->setup;
     const size_t n = (size_t)s->bytes, all = (size_t)job->width * (size_t)job->height;
     const size_t lanes = (size_t)txp_lanes(s), tail = n - (size_t)s->guide_at;
-    status = txp_check_mask(again, "again", u->width, u->height, env);
+    status = txm_mask_check(again, "again", u->width, u->height, TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
-    mask = txm_image_resolve(*again);
     if (guide) {
         if (!s->guide_bytes)
             return txm_fail(env, TXM_BAD_ARGUMENT, "the job was begun without a guide");
@@ -66,22 +65,25 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     }
     status = txp_run(job, env);
     if (status != TXM_OK) return status;
+    memset(&new_guide, 0, sizeof new_guide);
+    txm_arena_init(&memory, env);
+    txm_arena_init(&masks, env);
+    texpatch_job *part = NULL;
+    if (txp_read_mask(again, TXM_MASK_REPLACES, &masks, &mask, env) != TXM_OK ||
+        txp_read_mask(guide ? guide_mask : NULL, TXM_MASK_ALLOWS, &masks, &counts, env) != TXM_OK)
+        goto no_memory;
 
     low_x = job->width;
     low_y = job->height;
     for (int y = 0; y < job->height; y++) {
         for (int x = 0; x < job->width; x++) {
-            if (!txp_is_in_part(job, &mask, x, y)) continue;
+            if (!txp_is_in_part(job, mask, x, y)) continue;
             low_x = x < low_x ? x : low_x;
             high_x = x > high_x ? x : high_x;
             low_y = y < low_y ? y : low_y;
             high_y = y;
         }
     }
-    memset(&new_guide, 0, sizeof new_guide);
-    memset(&no_mask, 0, sizeof no_mask);
-    txm_arena_init(&memory, env);
-    texpatch_job *part = NULL;
     if (guide) {
         txp_given_make(&new_guide, s, all, 0, 1, 0, &memory);
         if (memory.failed) goto no_memory;
@@ -89,9 +91,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         status = txp_show(&to, 0, u->tileable, &memory, env);
         if (status != TXM_OK) {
             txm_arena_free(&memory);
+            txm_arena_free(&masks);
             return status;
         }
-        txp_guide_load(job, &to, guide_mask ? guide_mask : &no_mask, &new_guide);
+        txp_guide_load(job, &to, counts, &new_guide);
     }
     if (high_x >= 0) {
         const int top = s->levels - 1;
@@ -129,7 +132,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                    tail);
     }
     txm_arena_free(&memory);
-    if (!part) return TXM_OK;
+    if (!part) {
+        txm_arena_free(&masks);
+        return TXM_OK;
+    }
     part->setup.tileable = 0;
     if (wide == job->width) part->setup.tileable |= u->tileable & TEXPATCH_TILE_X;
     if (high == job->height) part->setup.tileable |= u->tileable & TEXPATCH_TILE_Y;
@@ -140,7 +146,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
         for (int x = 0; x < wide; x++) {
             const size_t i = (size_t)y * (size_t)wide + (size_t)x;
             const size_t k = txp_index(&job->canvas, x0 + x, y0 + y);
-            part->given.fixed[i] = !txp_is_in_part(job, &mask, x0 + x, y0 + y) ||
+            part->given.fixed[i] = !txp_is_in_part(job, mask, x0 + x, y0 + y) ||
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
@@ -150,8 +156,10 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     job->part = part;
     job->part_x = x0;
     job->part_y = y0;
+    txm_arena_free(&masks);
     return TXM_OK;
 no_memory:
+    txm_arena_free(&masks);
     txm_arena_free(&memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a part");
 }

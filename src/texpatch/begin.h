@@ -47,8 +47,9 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     }
 }
 
-/* Copy the guide and its mask to the canvas; the margin repeats the border. */
-static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const txm_image *mask,
+/* Copy the guide and its mask to the canvas; the margin repeats the border. mask: a byte for each
+   pixel, 0 where the guide does not count; NULL: it counts everywhere. */
+static void txp_guide_load(const texpatch_job *job, const txm_image *guide, const uint8_t *mask,
                            const txp_given *g) {
     const txp_source *s = job->source;
     const txp_setup *u = &job->setup;
@@ -62,8 +63,7 @@ static void txp_guide_load(const texpatch_job *job, const txm_image *guide, cons
             txp_features(u, s, NULL, guide, gx, gy, 1, bytes);
             memcpy(g->pixels + i * (size_t)s->bytes + s->guide_at, bytes + s->guide_at, tail);
             if (g->free_guide)
-                g->free_guide[i] =
-                    mask->pixels && ((const uint8_t *)txm_image_row_const(mask, gy))[gx] == 0;
+                g->free_guide[i] = mask && !mask[(size_t)gy * (size_t)u->width + (size_t)gx];
         }
     }
 }
@@ -81,7 +81,8 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
                                        texpatch_job **out) {
     txp_setup setup;
     txp_source source, *s;
-    txm_arena memory, source_memory;
+    txm_arena memory, source_memory, masks;
+    uint8_t *keep = NULL, *counts = NULL;
     if (!out) return txm_fail(env, TXM_BAD_ARGUMENT, "out is NULL");
     *out = NULL;
     if (!desc) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL; pass a texpatch_desc");
@@ -105,6 +106,7 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     if (!wx && width < room) width = room;
     if (!wy && height < room) height = room;
     const size_t pixels = (size_t)width * (size_t)height;
+    txm_arena_init(&masks, env);
     texpatch_job *job = txp_job_make(&setup, s, width, height, desc->seed, &memory, env);
     if (!job) goto no_memory;
     job->margin_x = wx ? 0 : TXP_MARGIN;
@@ -112,29 +114,33 @@ TEXPATCH_API txm_status texpatch_begin(const texpatch_desc *desc, txm_env *env,
     txp_lattice_start(s, desc->seed, &job->shift_x, &job->shift_y);
     if (s->guide_bytes || desc->kept) {
         txp_given_make(&job->given, s, pixels, desc->kept != NULL, s->guide_bytes > 0, 0, &memory);
-        if (memory.failed) goto no_memory;
+        if (memory.failed ||
+            (desc->kept &&
+             txp_read_mask(&desc->keep, TXM_MASK_ALLOWS, &masks, &keep, env) != TXM_OK) ||
+            (s->guide_bytes &&
+             txp_read_mask(&desc->guide_mask, TXM_MASK_ALLOWS, &masks, &counts, env) != TXM_OK))
+            goto no_memory;
         for (int y = 0; y < desc->height && desc->kept; y++) {
-            const uint8_t *keep = (const uint8_t *)txm_image_row_const(&desc->keep, y);
             for (int x = 0; x < desc->width; x++) {
                 const size_t i =
                     (size_t)(y + job->margin_y) * (size_t)width + (size_t)(x + job->margin_x);
-                if (!keep[x]) continue;
+                if (!keep[(size_t)y * (size_t)desc->width + (size_t)x]) continue;
                 job->given.fixed[i] = 1;
                 txp_features(&setup, s, setup.kept, NULL, x, y, 1,
                              job->given.pixels + i * (size_t)s->bytes);
             }
         }
         if (s->guide_bytes) {
-            const txm_image mask =
-                desc->guide_mask.pixels ? txm_image_resolve(desc->guide_mask) : desc->guide_mask;
-            txp_guide_load(job, &guide, &mask, &job->given);
+            txp_guide_load(job, &guide, counts, &job->given);
         }
     }
+    txm_arena_free(&masks);
     job->memory = memory;
     job->source_memory = source_memory;
     *out = job;
     return TXM_OK;
 no_memory:
+    txm_arena_free(&masks);
     txm_arena_free(&memory);
     txm_arena_free(&source_memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");

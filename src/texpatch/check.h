@@ -36,16 +36,6 @@ static txm_status txp_check_picture(const txm_image *im, const char *name, txm_e
     return TXM_OK;
 }
 
-static txm_status txp_check_mask(const txm_image *im, const char *name, int width, int height,
-                                 txm_env *env) {
-    const txm_status status = txm_image_check(im, name, TEXPATCH_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (im->sample != TXM_U8 || im->channels > 1 || im->width != width || im->height != height)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name,
-                           "must be TXM_U8 with 1 channel and the size of its picture");
-    return TXM_OK;
-}
-
 /* Which of the compared bytes are alpha, and of which others. */
 static void txp_find_alphas(const txp_setup *u, txp_source *s) {
     int n = 0;
@@ -188,7 +178,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
                       &u->guide_high);
         }
         if (x->mask.pixels) {
-            status = txp_check_mask(&x->mask, "mask", w, h, env);
+            status = txm_mask_check(&x->mask, "mask", w, h, TEXPATCH_MAX_PIXELS, env);
             u->masks[e] = x->mask;
         }
     }
@@ -223,7 +213,8 @@ static txm_status txp_check_guide(const txm_image *guide, const txm_image *mask,
         return txm_fail_at(env, TXM_BAD_ARGUMENT, "guide",
                            "must have the size of the output and "
                            "the format of the exemplars' guides");
-    return mask && mask->pixels ? txp_check_mask(mask, "guide_mask", width, height, env) : TXM_OK;
+    if (!mask || !mask->pixels) return TXM_OK;
+    return txm_mask_check(mask, "guide_mask", width, height, TEXPATCH_MAX_PIXELS, env);
 }
 
 /* The fields about the output. */
@@ -251,7 +242,7 @@ static txm_status txp_check_output(const texpatch_desc *d, txp_setup *u, const t
         status = txp_check_guide(&d->guide, &d->guide_mask, u, d->width, d->height, env);
     if (status != TXM_OK || !d->kept) return status;
     if (!d->keep.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "kept needs the mask keep");
-    status = txp_check_mask(&d->keep, "keep", d->width, d->height, env);
+    status = txm_mask_check(&d->keep, "keep", d->width, d->height, TEXPATCH_MAX_PIXELS, env);
     for (int m = 0; m < d->map_count && status == TXM_OK; m++) {
         status = txp_check_picture(&d->kept[m], "kept", env);
         if (status != TXM_OK) return status;

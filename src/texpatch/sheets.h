@@ -302,7 +302,19 @@ typedef struct txp_rows {
     const txp_setup *setup;
     txp_source *source;
     uint8_t *bad;
+    uint8_t *mask[TEXPATCH_MAX_EXEMPLARS]; /* 0: the pixel may not be used; NULL: all may be     */
 } txp_rows;
+
+/* The bytes of a mask; *bytes is NULL without one. */
+static txm_status txp_read_mask(const txm_image *mask, txm_mask_use use, txm_arena *arena,
+                                uint8_t **bytes, txm_env *env) {
+    *bytes = NULL;
+    if (!mask || !mask->pixels) return TXM_OK;
+    *bytes = (uint8_t *)txm_arena_alloc(arena, (size_t)mask->width, (size_t)mask->height);
+    if (!*bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the masks");
+    txm_mask_read(mask, use, *bytes);
+    return TXM_OK;
+}
 
 /* One row of the stack at full size. */
 static void txp_stack_row(void *context, int y) {
@@ -311,18 +323,19 @@ static void txp_stack_row(void *context, int y) {
     const txp_stack *k = &s->stack[0];
     const int n = k->sheet[y];
     const txp_sheet *sheet = &s->sheet[n];
-    const txm_image *mask = &r->setup->masks[sheet->exemplar];
+    const txm_image *im = &r->setup->maps[sheet->exemplar][0];
+    const uint8_t *mask = r->mask[sheet->exemplar];
     for (int x = 0; x < k->wide[n]; x++) {
         double ex, ey;
         txp_sheet_place(sheet, x, y - k->first[n], &ex, &ey);
         txp_features(r->setup, s, r->setup->maps[sheet->exemplar],
                      &r->setup->guides[sheet->exemplar], ex, ey, sheet->plain,
                      k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes);
-        if (r->bad && mask->pixels) {
-            const int ix = txm_clampi((int)floor(ex + 0.5), 0, mask->width - 1);
-            const int iy = txm_clampi((int)floor(ey + 0.5), 0, mask->height - 1);
+        if (r->bad && mask) {
+            const int ix = txm_clampi((int)floor(ex + 0.5), 0, im->width - 1);
+            const int iy = txm_clampi((int)floor(ey + 0.5), 0, im->height - 1);
             r->bad[(size_t)y * (size_t)k->width + (size_t)x] =
-                ((const uint8_t *)txm_image_row_const(mask, iy))[ix] == 0;
+                mask[(size_t)iy * (size_t)im->width + (size_t)ix] == 0;
         }
     }
 }
@@ -334,8 +347,12 @@ static txm_status txp_stacks(const txp_setup *u, txp_source *s, txm_arena *arena
     uint8_t *bad[TXP_MAX_LEVELS] = {NULL};
     int has_mask = 0;
     txm_status status = TXM_OK;
-    for (int e = 0; e < u->exemplar_count; e++) has_mask |= u->masks[e].pixels != NULL;
+    memset(&rows, 0, sizeof rows);
     txm_arena_init(&scratch, env);
+    for (int e = 0; e < u->exemplar_count && status == TXM_OK; e++) {
+        has_mask |= u->masks[e].pixels != NULL;
+        status = txp_read_mask(&u->masks[e], TXM_MASK_ALLOWS, &scratch, &rows.mask[e], env);
+    }
     for (int l = 0; l < s->levels && status == TXM_OK; l++) {
         status = txp_stack_make(s, &s->stack[l], arena, has_mask, env);
         if (status != TXM_OK || !has_mask) continue;

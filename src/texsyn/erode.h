@@ -42,12 +42,14 @@ static txm_status txs_check_erosion(const texsyn_erosion_desc *d, txm_env *env) 
 /* How many pixels are known: opaque and in the mask. */
 static size_t txs_find_known(txs_stone *s, const txm_image *im, const txm_image *mask) {
     size_t count = 0;
+    if (mask->pixels) txm_mask_read(mask, TXM_MASK_ALLOWS, s->known);
     for (int y = 0; y < s->height; y++) {
         for (int x = 0; x < s->width; x++) {
-            int ok = !mask->pixels || txs_is_white(mask, x, y);
+            uint8_t *known = &s->known[(size_t)y * (size_t)s->width + (size_t)x];
+            int ok = !mask->pixels || *known;
             if (im->channels % 2 == 0)
                 ok = ok && txm_image_get(im, x, y, im->channels - 1) >= 0.5f;
-            s->known[(size_t)y * (size_t)s->width + (size_t)x] = (uint8_t)ok;
+            *known = (uint8_t)ok;
             count += (size_t)ok;
         }
     }

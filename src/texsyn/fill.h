@@ -4,6 +4,7 @@
 #include "mosaic_learner.h"
 #include "tone.h"
 #include "learn.h"
+#include "mask.h"
 
 /* ---- filling -----------------------------------------------------------------------------
 
@@ -56,26 +57,6 @@ typedef struct txs_filler {
 
 /* ---- checks --------------------------------------------------------------------------- */
 
-/* Is the mask set here? Gray times alpha is at least half of its range. */
-static int txs_mask_at(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    const uint8_t *p = (const uint8_t *)txm_image_row_const(&m, y) + (size_t)x * (size_t)m.channels;
-    const int alpha = m.channels == 2 ? p[1] : m.channels == 4 ? p[3] : 255;
-    const int gray = m.channels < 3 ? p[0] : (54 * p[0] + 183 * p[1] + 19 * p[2] + 128) / 256;
-    return 2 * gray * alpha >= 255 * 255;
-}
-
-static txm_status txs_fill_check_mask(const txm_image *mask, const char *name,
-                                      const txm_image *image, txm_env *env) {
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->sample != TXM_U8)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must have 8-bit samples");
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "must be as large as the image");
-    return TXM_OK;
-}
-
 static txm_status txs_fill_check(const texsyn_fill_desc *d, const txm_image *out, txm_env *env) {
     txm_status status;
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "fill: desc is NULL");
@@ -83,10 +64,9 @@ static txm_status txs_fill_check(const texsyn_fill_desc *d, const txm_image *out
         return status;
     const int channels = d->image.channels ? d->image.channels : 1;
     if (channels == 2) return txm_fail(env, TXM_BAD_ARGUMENT, "image: 2 channels; give 1, 3 or 4");
-    if ((status = txs_fill_check_mask(&d->mask, "mask", &d->image, env)) != TXM_OK) return status;
-    if (d->source.pixels &&
-        (status = txs_fill_check_mask(&d->source, "source", &d->image, env)) != TXM_OK)
-        return status;
+    if (!d->mask.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "mask: pixels is NULL");
+    if ((status = txs_check_mask(&d->mask, &d->image, "mask", env)) != TXM_OK) return status;
+    if ((status = txs_check_mask(&d->source, &d->image, "source", env)) != TXM_OK) return status;
     if (d->model && d->model->channels != channels)
         return txm_fail(env, TXM_BAD_ARGUMENT, "model: must have the channels of the image");
     if (d->quality < -2 || d->quality > 2)
@@ -122,12 +102,18 @@ static txm_status txs_fill_open(txs_filler *f, txm_arena *arena, txm_env *env) {
     f->image = txm_image_resolve(f->image);
     f->state = (uint8_t *)txm_arena_alloc(arena, pixels, 1);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the picture");
+    uint8_t *source;
+    const txm_status status = txs_read_mask(&d->source, arena, &source, env);
+    if (status != TXM_OK) return status;
     txs_copy_picture(&im, &f->image);
+    txm_mask_read(&d->mask, TXM_MASK_REPLACES, f->state);
     for (int y = 0; y < im.height; y++) {
         for (int x = 0; x < im.width; x++) {
-            uint8_t *state = &f->state[(size_t)y * (size_t)im.width + (size_t)x];
-            const int is_source = !d->source.pixels || txs_mask_at(&d->source, x, y);
-            *state = txs_mask_at(&d->mask, x, y) ? TXS_FREE : is_source ? TXS_SOURCE : TXS_KNOWN;
+            const size_t i = (size_t)y * (size_t)im.width + (size_t)x;
+            uint8_t *state = &f->state[i];
+            *state = (uint8_t)(*state                   ? TXS_FREE
+                               : !source || source[i] ? TXS_SOURCE
+                                                      : TXS_KNOWN);
             f->missing += *state == TXS_FREE;
             f->source += *state == TXS_SOURCE;
             if (*state != TXS_FREE && !txs_fill_is_sound(&im, x, y))
@@ -136,7 +122,7 @@ static txm_status txs_fill_open(txs_filler *f, txm_arena *arena, txm_env *env) {
         }
     }
     if (!f->missing)
-        return txm_fail(env, TXM_BAD_ARGUMENT, "mask: is empty; white is what is to be filled");
+        return txm_fail(env, TXM_BAD_ARGUMENT, "mask: is empty, nothing of it is at least half white; white is what is to be filled");
     if ((size_t)f->missing == pixels)
         return txm_fail(env, TXM_BAD_ARGUMENT, "mask: covers the whole picture; nothing is known");
     if (f->source < TXS_FILL_FEW)

@@ -63,7 +63,9 @@ static txm_status txs_knit_check_border(const texsyn_knit_desc *d, txm_env *env)
     if (status != TXM_OK) return status;
     if (txs_channels_of(&d->border) != txs_channels_of(&d->a))
         return txm_fail(env, TXM_BAD_ARGUMENT, "border: must have the channels of a");
-    return txs_fill_check_mask(&d->border_layout, "border_layout", &d->border, env);
+    if (!d->border_layout.pixels)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "border_layout: pixels is NULL");
+    return txs_check_mask(&d->border_layout, &d->border, "border_layout", env);
 }
 
 static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out, txm_env *env) {
@@ -74,7 +76,8 @@ static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out
         return status;
     if (txs_channels_of(&d->b) != txs_channels_of(&d->a) || d->b.sample != d->a.sample)
         return txm_fail(env, TXM_BAD_ARGUMENT, "b: must have the channels and samples of a");
-    if ((status = txs_fill_check_mask(&d->layout, "layout", &d->a, env)) != TXM_OK) return status;
+    if (!d->layout.pixels) return txm_fail(env, TXM_BAD_ARGUMENT, "layout: pixels is NULL");
+    if ((status = txs_check_mask(&d->layout, &d->a, "layout", env)) != TXM_OK) return status;
     if (d->border.pixels && (status = txs_knit_check_border(d, env)) != TXM_OK) return status;
     if (d->zone < 0 || d->zone > TXS_KNIT_MOST)
         return txm_fail(env, TXM_BAD_ARGUMENT, "zone must be 1 to 64, or 0 for the default");
@@ -96,14 +99,9 @@ static txm_status txs_knit_check(const texsyn_knit_desc *d, const txm_image *out
 
 /* Read a layout; returns how many pixels are white. */
 static size_t txs_knit_read(const txm_image *layout, uint8_t *label) {
-    size_t white = 0;
-    for (int y = 0; y < layout->height; y++) {
-        for (int x = 0; x < layout->width; x++) {
-            const int is_white = txs_mask_at(layout, x, y);
-            label[(size_t)y * (size_t)layout->width + (size_t)x] = (uint8_t)is_white;
-            white += (size_t)is_white;
-        }
-    }
+    const size_t pixels = txs_pixels_of(layout->width, layout->height);
+    const size_t white = txm_mask_read(layout, TXM_MASK_DIVIDES, label);
+    for (size_t i = 0; i < pixels; i++) label[i] = label[i] != 0;
     return white;
 }
 

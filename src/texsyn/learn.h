@@ -17,14 +17,7 @@ static txm_status txs_learn_check(const texsyn_learn_desc *d, txm_env *env) {
         return txm_fail(env, TXM_TOO_SMALL, "example: both sides must be at least 16 pixels");
     if (!txs_image_is_moderate(&d->example))
         return txm_fail(env, TXM_BAD_ARGUMENT, "example: a sample is NaN or beyond a million");
-    if (d->mask.pixels) {
-        if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
-            return status;
-        if (d->mask.width != d->example.width || d->mask.height != d->example.height)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must be as large as the example");
-        if (d->mask.channels > 1 || d->mask.sample != TXM_U8)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must have one 8-bit channel");
-    }
+    if ((status = txs_check_mask(&d->mask, &d->example, "mask", env)) != TXM_OK) return status;
     if (d->max_distance < 0 || d->max_distance == 1 || d->max_distance > TXS_MAX_REACH)
         return txm_fail(env, TXM_BAD_ARGUMENT, "max_distance must be 2 to 60, or 0");
     if (d->max_types < 0 || d->max_types > 60)
@@ -89,14 +82,10 @@ static txm_status txs_prepare(const texsyn_learn_desc *desc, texsyn_model *m, tx
         s->canvas.pixels = (uint8_t *)txm_arena_zero(arena, pixels, 2 * (size_t)m->channels + 1);
         if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         if (i == 0) {
-            for (int y = 0; y < s->height && s->mask; y++)
-                memcpy(s->mask + (size_t)y * (size_t)s->width, txm_image_row_const(&desc->mask, y),
-                       (size_t)s->width);
-            size_t seen = 0;
-            for (size_t k = 0; k < pixels && s->mask; k++) seen += s->mask[k] != 0;
-            if (s->mask && seen < 256)
+            if (s->mask && txm_mask_read(&desc->mask, TXM_MASK_ALLOWS, s->mask) < 256)
                 return txm_fail(env, TXM_TOO_SMALL,
-                                "mask: fewer than 256 pixels (16 x 16) are not 0");
+                                "mask: fewer than 256 pixels (16 x 16) count; they do where gray "
+                                "times alpha is at least half");
             if (!txs_split_visible(m, im, s, arena))
                 return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the example");
         } else {

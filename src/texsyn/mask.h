@@ -17,16 +17,6 @@ static void txs_copy_picture(const txm_image *from, const txm_image *to) {
         memmove(txm_image_row(&b, y), txm_image_row_const(&a, y), row);
 }
 
-/* gray times alpha is at least half: the rule for masks */
-static int txs_is_white(const txm_image *mask, int x, int y) {
-    const txm_image m = txm_image_resolve(*mask);
-    double v = (double)txm_image_get(&m, x, y, 0);
-    if (m.channels >= 3)
-        v = (v + (double)txm_image_get(&m, x, y, 1) + (double)txm_image_get(&m, x, y, 2)) / 3;
-    if (m.channels % 2 == 0) v *= (double)txm_image_get(&m, x, y, m.channels - 1);
-    return v >= 0.5;
-}
-
 /* no float sample is NaN or larger than LIMITS says */
 static int txs_image_is_moderate(const txm_image *image) {
     const txm_image im = txm_image_resolve(*image);
@@ -38,16 +28,21 @@ static int txs_image_is_moderate(const txm_image *image) {
     return 1;
 }
 
+/* A mask that may be left out, of a picture. */
 static txm_status txs_check_mask(const txm_image *mask, const txm_image *image, const char *name,
                                  txm_env *env) {
     if (!mask->pixels) return TXM_OK;
-    const txm_status status = txm_image_check(mask, name, TEXSYN_MAX_PIXELS, env);
-    if (status != TXM_OK) return status;
-    if (mask->width != image->width || mask->height != image->height)
-        return txm_fail_numbers_at(env, TXM_BAD_ARGUMENT, name, "must be # x # like its picture",
-                                   (uint64_t)image->width, (uint64_t)image->height);
-    if (!txm_image_is_finite(mask))
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, name, "has samples that are not finite");
+    return txm_mask_check(mask, name, image->width, image->height, TEXSYN_MAX_PIXELS, env);
+}
+
+/* The bytes of a mask of what may be used, 255 where it counts; *bytes is NULL without a mask. */
+static txm_status txs_read_mask(const txm_image *mask, txm_arena *arena, uint8_t **bytes,
+                                txm_env *env) {
+    *bytes = NULL;
+    if (!mask->pixels) return TXM_OK;
+    *bytes = (uint8_t *)txm_arena_alloc(arena, txs_pixels_of(mask->width, mask->height), 1);
+    if (!*bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the mask");
+    txm_mask_read(mask, TXM_MASK_ALLOWS, *bytes);
     return TXM_OK;
 }
 

@@ -193,17 +193,20 @@ static txm_status txs_choose_light(txs_lighting *w, txm_env *env, texsyn_light *
     return TXM_OK;
 }
 
-static int txs_counts(const txm_image *im, const txm_image *mask, int x, int y) {
-    if (mask->pixels && !txs_is_white(mask, x, y)) return 0;
+static int txs_counts(const txm_image *im, const uint8_t *mask, int x, int y) {
+    if (mask && !mask[(size_t)y * (size_t)im->width + (size_t)x]) return 0;
     return im->channels % 2 == 1 || txm_image_get(im, x, y, im->channels - 1) >= 0.5f;
 }
 
 /* Samples of the pixels that count, evenly spread over them but at random within each stretch. */
-static txm_status txs_take_swatches(const txm_image *image, const txm_image *mask, const char *name,
+static txm_status txs_take_swatches(const txm_image *image, const txm_image *where, const char *name,
                                     txm_arena *arena, txs_swatches *s, txs_cloud *cloud,
                                     txm_env *env) {
     const txm_image im = txm_image_resolve(*image);
     int64_t total = 0, seen = 0;
+    uint8_t *mask;
+    const txm_status status = txs_read_mask(where, arena, &mask, env);
+    if (status != TXM_OK) return status;
     for (int y = 0; y < im.height; y++)
         for (int x = 0; x < im.width; x++) total += txs_counts(&im, mask, x, y);
     if (total < TXS_LEAST_SWATCHES)

@@ -30,6 +30,7 @@ typedef struct txs_segmenter {
     txs_partition partition;
     txs_refiner refiner;
     uint32_t *nearest; /* of each pixel of the scene the counted one nearest to it */
+    uint8_t *mask;     /* of each pixel of the picture; NULL: all take part         */
 } txs_segmenter;
 
 /* Steps to the nearest counted pixel, by two passes; its index for each pixel. */
@@ -63,7 +64,8 @@ static txm_status txs_no_memory_to_segment(txm_env *env) {
 
 typedef struct txs_reducer {
     txs_scene *scene;
-    txm_image image, mask;
+    txm_image image;
+    const uint8_t *mask;
     const txs_colours *tables;
 } txs_reducer;
 
@@ -73,17 +75,17 @@ static void txs_reduce_rows(void *context, int share) {
     const int from = (int)((int64_t)s->height * share / TXS_TASKS);
     const int to = (int)((int64_t)s->height * (share + 1) / TXS_TASKS);
     for (int y = from; y < to; y++)
-        for (int x = 0; x < s->width; x++) txs_reduce(s, &r->image, &r->mask, r->tables, x, y);
+        for (int x = 0; x < s->width; x++) txs_reduce(s, &r->image, r->mask, r->tables, x, y);
 }
 
 /* Do enough pixels take part? */
-static txm_status txs_check_counted(const txs_segmenter *g, txm_image image, txm_image mask) {
+static txm_status txs_check_counted(const txs_segmenter *g, txm_image image) {
     const txs_scene *s = &g->scene;
     size_t whole = 0, counted = 0;
     for (size_t i = 0; i < s->pixels; i++) whole += s->counted[i];
     for (int y = 0; y < image.height && counted < TXS_LEAST_COUNTED; y++)
         for (int x = 0; x < image.width; x++)
-            counted += (size_t)txs_takes_part(&image, &mask, x, y);
+            counted += (size_t)txs_takes_part(&image, g->mask, x, y);
     if (counted >= TXS_LEAST_COUNTED && whole > 0) return TXM_OK;
     return txm_fail(g->env, TXM_TOO_SMALL,
                     "fewer than 256 pixels (16 x 16) take part, by mask and alpha");
@@ -119,10 +121,9 @@ static txm_status txs_see_scene(txs_segmenter *g) {
         status = txs_no_memory_to_segment(g->env);
     } else {
         txs_colour_tables(tables);
-        txs_reducer r = {s, txm_image_resolve(*im), g->desc->mask, tables};
-        if (r.mask.pixels) r.mask = txm_image_resolve(r.mask);
+        txs_reducer r = {s, txm_image_resolve(*im), g->mask, tables};
         txm_parallel_for(g->env, TXS_TASKS, txs_reduce_rows, &r);
-        status = txs_check_counted(g, r.image, r.mask);
+        status = txs_check_counted(g, r.image);
     }
     if (status == TXM_OK) {
         txs_find_nearest(s, g->nearest, steps);
@@ -383,14 +384,13 @@ static void txs_write_labels(void *context, int share) {
     const txs_writer *w = (const txs_writer *)context;
     const txs_scene *s = &w->job->scene;
     const txm_image im = txm_image_resolve(w->job->desc->image), *out = w->out;
-    txm_image mask = w->job->desc->mask;
-    if (mask.pixels) mask = txm_image_resolve(mask);
+    const uint8_t *mask = w->job->mask;
     const int from = (int)((int64_t)out->height * share / TXS_TASKS);
     const int to = (int)((int64_t)out->height * (share + 1) / TXS_TASKS);
     for (int y = from; y < to; y++) {
         uint8_t *row = (uint8_t *)txm_image_row(out, y);
         for (int x = 0; x < out->width; x++)
-            row[x] = txs_takes_part(&im, &mask, x, y) ? txs_vote(s, w->job->refiner.label, x, y)
+            row[x] = txs_takes_part(&im, mask, x, y) ? txs_vote(s, w->job->refiner.label, x, y)
                                                       : (uint8_t)TEXSYN_NO_LABEL;
     }
 }
@@ -409,12 +409,7 @@ static txm_status txs_segment_check(const texsyn_segment_desc *d, const txm_imag
         return txm_fail(env, TXM_TOO_SMALL, "image: both sides must be at least 16 pixels");
     if (!txs_image_is_moderate(&d->image))
         return txm_fail(env, TXM_BAD_ARGUMENT, "image: a sample is NaN or beyond a million");
-    if (d->mask.pixels) {
-        if ((status = txm_image_check(&d->mask, "mask", TEXSYN_MAX_PIXELS, env)) != TXM_OK)
-            return status;
-        if (d->mask.width != d->image.width || d->mask.height != d->image.height)
-            return txm_fail(env, TXM_BAD_ARGUMENT, "mask: must be as large as the image");
-    }
+    if ((status = txs_check_mask(&d->mask, &d->image, "mask", env)) != TXM_OK) return status;
     if (d->segments < 0 || d->segments > TEXSYN_MAX_SEGMENTS)
         return txm_fail(env, TXM_BAD_ARGUMENT, "segments must be 1 to 16, or 0");
     if ((status = txm_image_check(out, "out", 0, env)) != TXM_OK) return status;
@@ -439,7 +434,8 @@ TEXSYN_API txm_status texsyn_segment(const texsyn_segment_desc *desc, txm_env *e
     g.desc = desc;
     g.env = env;
     txm_arena_init(&g.arena, env);
-    status = txs_see_scene(&g);
+    status = txs_read_mask(&desc->mask, &g.arena, &g.mask, env);
+    if (status == TXM_OK) status = txs_see_scene(&g);
     if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_TEXTONS, "textons");
     if (status == TXM_OK) status = txs_make_textons(&g);
     if (status == TXM_OK) status = txs_report_stage(&g, TXS_AT_REGIONS, "regions");

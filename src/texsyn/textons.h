@@ -96,22 +96,15 @@ static int txs_sample_code(const txm_image *im, int x, int y, int c) {
 
 /* ---- the picture at working resolution ------------------------------------------------------ */
 
-/* Does the pixel take part? By the mask, where there is one, and by its own alpha. */
-static int txs_takes_part(const txm_image *im, const txm_image *mask, int x, int y) {
+/* Does the pixel take part? By the bytes of the mask, where there is one, and by its own alpha. */
+static int txs_takes_part(const txm_image *im, const uint8_t *mask, int x, int y) {
     const int alpha = im->channels == 2 || im->channels == 4;
     if (alpha && txs_sample_code(im, x, y, im->channels - 1) < TXS_CODES / 2) return 0;
-    if (!mask->pixels) return 1;
-    int gray = 0;
-    const int colours = mask->channels < 3 ? 1 : 3;
-    for (int c = 0; c < colours; c++) gray += txs_sample_code(mask, x, y, c);
-    gray /= colours;
-    if (mask->channels == 2 || mask->channels == 4)
-        gray = gray * txs_sample_code(mask, x, y, mask->channels - 1) / TXS_CODES;
-    return gray >= TXS_CODES / 2;
+    return !mask || mask[(size_t)y * (size_t)im->width + (size_t)x];
 }
 
 /* One pixel of the scene: the mean of those of its square that take part, weighted by alpha. */
-static void txs_reduce(txs_scene *s, const txm_image *im, const txm_image *mask,
+static void txs_reduce(txs_scene *s, const txm_image *im, const uint8_t *mask,
                        const txs_colours *tables, int x, int y) {
     const int f = s->factor, colours = im->channels < 3 ? 1 : 3;
     const int right = txm_clampi((x + 1) * f, 0, im->width);

@@ -153,8 +153,8 @@ static uint64_t poisson_hash(float screen, int with_target, txm_env *env) {
     txm_rng rng = txm_rng_make(6, 2);
     for (int i = 0; i < WIDE * HIGH; i++) {
         const int x = i % WIDE, y = i / WIDE;
-        mask[i] =
-            (uint8_t)((x > 4 && x < 30 && y > 3 && y < 30 && (x - 15) * (y - 12) < 60) || x == 39);
+        const int inside = x > 4 && x < 30 && y > 3 && y < 30 && (x - 15) * (y - 12) < 60;
+        mask[i] = inside || x == 39 ? 255 : 0;
         for (int c = 0; c < 3; c++) {
             image[3 * i + c] = txm_rng_float(&rng);
             target[3 * i + c] = 0.1f * (txm_rng_float(&rng) - 0.5f);
