@@ -24,9 +24,10 @@ enum {
     TXM_MASK_TILE = 64, /* pixels: smooth or sharp is decided for squares of that side, by        */
     TXM_MASK_ROUND = 32 /* what is in them and so far around; ours                                */
 };
-#define TXM_MASK_FEW (1.0 / 32) /* of the pixels at the border: of so many as are between a quarter
-                                   and three quarters, a smooth mask has more (antialiased shapes a
-                                   quarter, a JPEG of quality 50 or more at most 1/40); ours      */
+#define TXM_MASK_FEW (1.0 / 32) /* of the pixels at the border: a smooth mask has more that lie between
+                                   their neighbours, at a quarter to three quarters (antialiased
+                                   shapes a quarter, a JPEG of quality 50 or more at most 1/40);
+                                   ours                                                           */
 
 /* What a mask says at (x, y), inside: gray times alpha, 0..1. Gray of RGB is (54 R + 183 G + 19 B) /
    256; samples beyond 0..1 are clamped, NaN is 0. */
@@ -118,6 +119,22 @@ static inline int txm_mask_is_mixed(const txm_mask_reader *r, int x0, int y0) {
     return 0;
 }
 
+/* Is the value at (x, y) near the half and between those of neighbours? That of an evenly gray area is
+   not. */
+static inline int txm_mask_is_between(const txm_mask_reader *r, int x, int y) {
+    const double here = txm_mask_value(&r->mask, x, y);
+    int lower = 0, higher = 0;
+    if (here < 0.25 || here > 0.75) return 0;
+    for (int v = txm_clampi(y - 1, 0, y); v - y <= 1 && v < r->mask.height; v++) {
+        for (int u = txm_clampi(x - 1, 0, x); u - x <= 1 && u < r->mask.width; u++) {
+            const double there = txm_mask_value(&r->mask, u, v);
+            lower |= there < here;
+            higher |= there > here;
+        }
+    }
+    return lower && higher;
+}
+
 /* Is the mask smooth in and around the square at (x0, y0)? */
 static inline int txm_mask_is_smooth(const txm_mask_reader *r, int x0, int y0) {
     const int left = txm_clampi(x0 - TXM_MASK_ROUND, 0, x0);
@@ -127,9 +144,8 @@ static inline int txm_mask_is_smooth(const txm_mask_reader *r, int x0, int y0) {
     for (int y = top; y < r->mask.height && y - y0 < reach; y++) {
         for (int x = left; x < r->mask.width && x - x0 < reach; x++) {
             if (!txm_mask_is_border(r, x, y)) continue;
-            const double v = txm_mask_value(&r->mask, x, y);
             border++;
-            between += v >= 0.25 && v <= 0.75;
+            between += (size_t)txm_mask_is_between(r, x, y);
         }
     }
     return (double)between > TXM_MASK_FEW * (double)border;

@@ -173,6 +173,19 @@ static void test_noise(void **state) {
     }
 }
 
+/* A sharp mask in two grays, such as paint of 60 %: no rim either. */
+static void test_grays(void **state) {
+    (void)state;
+    size_t counts[3], light = 0;
+    const txm_image m = view(&memory, SIDE, SIDE, 1, TXM_U16);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        memory.words[i] = covered(i % SIDE, i / SIDE, 30) >= 8 ? 40000 : 20000;
+        light += memory.words[i] == 40000;
+    }
+    read_all(&m, counts);
+    for (int use = 0; use < 3; use++) assert_int_equal(counts[use], light);
+}
+
 /* A sharp square far from an antialiased disc keeps its edges: each is judged by itself. */
 static void test_mixed(void **state) {
     (void)state;
@@ -258,6 +271,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_forms),  cmocka_unit_test(test_half),  cmocka_unit_test(test_antialiased),
         cmocka_unit_test(test_blurred), cmocka_unit_test(test_noise), cmocka_unit_test(test_mixed),
+        cmocka_unit_test(test_grays),
         cmocka_unit_test(test_check),  cmocka_unit_test(test_random),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
