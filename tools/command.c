@@ -77,6 +77,56 @@ int check_extent(cli *run, const char *what, const char *path, const txm_image *
                     image->width, image->height, width, height, like);
 }
 
+/* How white the lightest pixel of a mask is, in percent. */
+static int lightest_of(const txm_image *mask) {
+    double most = 0;
+    for (int y = 0; y < mask->height; y++) {
+        for (int x = 0; x < mask->width; x++) {
+            const double v = txm_mask_value(mask, x, y);
+            most = v > most ? v : most;
+        }
+    }
+    return (int)(100 * most);
+}
+
+/* Say what the user may not have meant with a mask of which so much counts, 0..1. */
+static int check_share(cli *run, const mask_role *role, const char *path, const txm_image *mask,
+                       double share) {
+    enum { MUCH = 90 }; /* percent */
+    const int replaces = role->use == TXM_MASK_REPLACES, allows = role->use == TXM_MASK_ALLOWS;
+    char text[160];
+    if (share <= 0) {
+        snprintf(text, sizeof text, "nothing of it counts, for its lightest pixel is %d %% white; what "
+                 "is at least half white %s", lightest_of(mask), role->white);
+        if (!role->is_optional)
+            return cli_fail(run, CLI_FAILED, "%s '%s': %s", role->what, path, text);
+        cli_warn(run, "%s '%s': %s", role->what, path, text);
+    } else if (share >= 1 && replaces && !role->is_optional) {
+        return cli_fail(run, CLI_FAILED, "%s '%s' covers the whole picture; what is white %s, so leave "
+                        "some of it black", role->what, path, role->white);
+    } else if (share >= 1) {
+        cli_warn(run, "%s '%s' is white everywhere: all %s", role->what, path, role->white);
+    } else if ((replaces && share > MUCH / 100.0) ||
+               (allows && !role->is_optional && share < 1 - MUCH / 100.0)) {
+        cli_warn(run, "%s '%s' is white in %.2g %% of the picture; what is white %s: invert it if that "
+                 "is not meant", role->what, path, 100 * share, role->white);
+    }
+    return CLI_DONE;
+}
+
+int read_mask(cli *run, const mask_role *role, const char *path, int width, int height,
+              const char *like, txm_image *mask) {
+    if (!path) return CLI_DONE;
+    int status = read_picture(run, path, 0, TXM_U16, mask);
+    if (!status) status = check_extent(run, role->what, path, mask, width, height, like);
+    if (status) return status;
+    unsigned char *bytes = (unsigned char *)new_array((size_t)width, (size_t)height);
+    if (!bytes) return fail_memory(run);
+    const double count = (double)txm_mask_read(mask, role->use, bytes);
+    free(bytes);
+    return check_share(run, role, path, mask, count / width / height);
+}
+
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size) {
     image_job job = {0};

@@ -55,6 +55,20 @@ int decode_picture(cli *run, const char *path, const unsigned char *bytes, size_
 int check_extent(cli *run, const char *what, const char *path, const txm_image *image, int width,
                  int height, const char *like);
 
+/* A mask of a command. Which pixels count is told by txm_mask_use in texmath.h, and only there. */
+typedef struct mask_role {
+    const char *what;  /* "the mask"                                                    */
+    const char *white; /* what happens where it counts: "is filled"                      */
+    txm_mask_use use;
+    int is_optional;   /* the command has something to do if nothing of it counts        */
+} mask_role;
+
+/* Read the mask of a picture of that size, in all its channels and bits. One of another size is
+   refused, and so is one with which nothing can be done; what else may not be meant is said in a
+   warning. path NULL: none, mask stays. like: whose size it must have. */
+int read_mask(cli *run, const mask_role *role, const char *path, int width, int height,
+              const char *like, txm_image *mask);
+
 /* Encode a picture in the format of the path's extension; *bytes is for free(). An exit status. */
 int encode_picture(cli *run, const char *path, const txm_image *image, unsigned char **bytes,
                    size_t *size);

@@ -5,12 +5,28 @@
 
 /* ---- what a pixel shows ----------------------------------------------------------------- */
 
+#define TXP_LEAST_BEND 0.05 /* pixels: less is none */
+
 /* What a pixel of the output shows: place (x, y) of sheet `sheet`; sheet -1: a kept pixel. */
 typedef struct txp_pixel {
     int sheet, is_whole;
     double x, y;
     const float *tone; /* NULL: none */
 } txp_pixel;
+
+/* May all the pixels be used between which (x, y) of a sheet lies? */
+static int txp_is_usable(const txp_source *s, int sheet, double x, double y) {
+    const txp_stack *k = &s->stack[0];
+    if (!k->bad) return 1;
+    const int left = txm_clampi((int)floor(x), 0, k->wide[sheet] - 1);
+    const int top = txm_clampi((int)floor(y), 0, k->high[sheet] - 1);
+    const int right = txm_clampi(left + 1, 0, k->wide[sheet] - 1);
+    const int bottom = txm_clampi(top + 1, 0, k->high[sheet] - 1);
+    const size_t w = (size_t)k->width + 1;
+    const uint32_t *upper = k->bad + (size_t)(k->first[sheet] + top) * w;
+    const uint32_t *lower = k->bad + (size_t)(k->first[sheet] + bottom + 1) * w;
+    return lower[right + 1] - lower[left] == upper[right + 1] - upper[left];
+}
 
 static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     txp_pixel out = {-1, 1, 0, 0, NULL};
@@ -35,8 +51,13 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     out.x = p.x;
     out.y = p.y - s->stack[0].first[out.sheet];
     if (!job->bend) return out;
-    const double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
-    if (bx * bx + by * by >= 0.05 * 0.05) {
+    double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
+    while (bx * bx + by * by >= TXP_LEAST_BEND * TXP_LEAST_BEND &&
+           !txp_is_usable(s, out.sheet, out.x + bx, out.y + by)) {
+        bx /= 2; /* towards the place itself, which may be used */
+        by /= 2;
+    }
+    if (bx * bx + by * by >= TXP_LEAST_BEND * TXP_LEAST_BEND) {
         out.is_whole = 0;
         out.x += bx;
         out.y += by;

@@ -305,6 +305,8 @@ typedef struct txp_rows {
     uint8_t *mask[TEXPATCH_MAX_EXEMPLARS]; /* 0: the pixel may not be used; NULL: all may be     */
 } txp_rows;
 
+#define TXP_WHOLE 0.001 /* pixels: so near to its centre nothing of its neighbours is seen */
+
 /* The bytes of a mask; *bytes is NULL without one. */
 static txm_status txp_read_mask(const txm_image *mask, txm_mask_use use, txm_arena *arena,
                                 uint8_t **bytes, txm_env *env) {
@@ -314,6 +316,17 @@ static txm_status txp_read_mask(const txm_image *mask, txm_mask_use use, txm_are
     if (!*bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the masks");
     txm_mask_read(mask, use, *bytes);
     return TXM_OK;
+}
+
+/* Do the pixels between which (x, y) of the exemplar lies all count? */
+static int txp_counts(const uint8_t *mask, const txm_image *im, double x, double y) {
+    const int left = txm_clampi((int)floor(x + TXP_WHOLE), 0, im->width - 1);
+    const int top = txm_clampi((int)floor(y + TXP_WHOLE), 0, im->height - 1);
+    const int right = txm_clampi((int)ceil(x - TXP_WHOLE), 0, im->width - 1);
+    const int bottom = txm_clampi((int)ceil(y - TXP_WHOLE), 0, im->height - 1);
+    const uint8_t *upper = mask + (size_t)top * (size_t)im->width;
+    const uint8_t *lower = mask + (size_t)bottom * (size_t)im->width;
+    return upper[left] && upper[right] && lower[left] && lower[right];
 }
 
 /* One row of the stack at full size. */
@@ -332,10 +345,7 @@ static void txp_stack_row(void *context, int y) {
                      &r->setup->guides[sheet->exemplar], ex, ey, sheet->plain,
                      k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes);
         if (r->bad && mask) {
-            const int ix = txm_clampi((int)floor(ex + 0.5), 0, im->width - 1);
-            const int iy = txm_clampi((int)floor(ey + 0.5), 0, im->height - 1);
-            r->bad[(size_t)y * (size_t)k->width + (size_t)x] =
-                mask[(size_t)iy * (size_t)im->width + (size_t)ix] == 0;
+            r->bad[(size_t)y * (size_t)k->width + (size_t)x] = (uint8_t)!txp_counts(mask, im, ex, ey);
         }
     }
 }

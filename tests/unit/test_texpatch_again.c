@@ -64,12 +64,12 @@ static void test_again(void **state) {
     for (int tileable = 0; tileable <= 3; tileable += 3) {
         txm_image mask = new_mask(W, H, 0);
         d.tileable = tileable;
-        fill_box(&mask, 40, 30, 90, 70, 1);
+        fill_box(&mask, 40, 30, 90, 70, 255);
         if (tileable) { /* across all borders */
-            fill_box(&mask, 0, 0, 30, 25, 9);
-            fill_box(&mask, W - 20, 0, W, 25, 9);
-            fill_box(&mask, 0, H - 20, 30, H, 9);
-            fill_box(&mask, W - 20, H - 20, W, H, 9);
+            fill_box(&mask, 0, 0, 30, 25, 255);
+            fill_box(&mask, W - 20, 0, W, 25, 255);
+            fill_box(&mask, 0, H - 20, 30, H, 255);
+            fill_box(&mask, W - 20, H - 20, W, H, 255);
         }
         /* seed 1, seed 2, seed 1 on another job that has not been run yet */
         for (int k = 0; k < 3; k++) {
@@ -116,8 +116,8 @@ static void test_again(void **state) {
     const txm_image nothing = new_mask(W, H, 0), one = new_mask(W, H, 0), two = new_mask(W, H, 0);
     int more = 1;
     d.tileable = 0;
-    fill_box(&one, 0, 0, 30, 30, 1);
-    fill_box(&two, 20, 20, 50, 40, 1);
+    fill_box(&one, 0, 0, 30, 30, 255);
+    fill_box(&two, 20, 20, 50, 40, 255);
     texpatch_job *job = begin(&d);
     run(job);
     before[0] = drawn(job, 0, &maps[0], W, H);
@@ -138,7 +138,7 @@ static void test_again(void **state) {
     assert_true(is_same(&after[0], &after[1]));
 
     /* all of it */
-    const txm_image all = new_mask(W, H, 1);
+    const txm_image all = new_mask(W, H, 255);
     job = begin(&d);
     run(job);
     assert_int_equal(texpatch_again(job, &all, NULL, NULL, 9, NULL), TXM_OK);
@@ -178,7 +178,7 @@ static void test_again_guide(void **state) {
     d.passes = 1;
     d.guide = new_mask(SIDE, SIDE, 0);
     const txm_image mask = new_mask(SIDE, SIDE, 0), guide = new_mask(SIDE, SIDE, 0);
-    fill_box(&mask, 24, 30, 100, 96, 1);
+    fill_box(&mask, 24, 30, 100, 96, 255);
     fill_box(&guide, 30, 36, 94, 90, 255);
     texpatch_job *job = begin(&d);
     run(job);

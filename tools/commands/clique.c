@@ -46,6 +46,7 @@ static const cli_manual learn_manual = {
 static int run_learn(int argc, char **argv) {
     cli run;
     texsyn_learn_desc desc = {0};
+    static const mask_role role = {"the mask", "is learned from", TXM_MASK_ALLOWS, 0};
     const char *mask_path = NULL;
     int even = EVEN_AUTO;
     const cli_option options[] = {
@@ -55,7 +56,7 @@ static int run_learn(int argc, char **argv) {
          &desc.max_types, 1, 60},
         {CLI_INT, "--levels", "N", "pyramid levels, 1 to 6; default: chosen by the size",
          &desc.levels, 1, 6},
-        {CLI_INPUT, "--mask", "M", "learn only where this picture of the same size is not black",
+        {CLI_INPUT, "--mask", "M", "learn only where this picture of the same size is white",
          &mask_path, 0, 0},
         {CLI_INT, "--even", "R", EVEN_HELP, &even, 0, EVEN_MOST},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
@@ -76,12 +77,9 @@ static int run_learn(int argc, char **argv) {
 
     cli_stage(&run, "read");
     status = read_picture(&run, run.inputs[0], 0, TXM_U8, &desc.example);
-    if (!status && mask_path) status = read_picture(&run, mask_path, 1, TXM_U8, &desc.mask);
-    if (!status && mask_path &&
-        (desc.mask.width != desc.example.width || desc.mask.height != desc.example.height))
-        status = cli_fail(&run, CLI_FAILED, "the mask '%s' is %d x %d; make it %d x %d like '%s'",
-                          mask_path, desc.mask.width, desc.mask.height, desc.example.width,
-                          desc.example.height, run.inputs[0]);
+    if (!status)
+        status = read_mask(&run, &role, mask_path, desc.example.width, desc.example.height,
+                           run.inputs[0], &desc.mask);
     if (!status) status = even_example(&run, even, &desc);
     if (status) goto done;
 

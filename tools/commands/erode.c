@@ -57,6 +57,7 @@ static int read_gray(erode_job *j, const char *what, const char *path, const txm
 }
 
 static int read_all(erode_job *j) {
+    static const mask_role role = {"the mask", "shows cracks", TXM_MASK_ALLOWS, 0};
     cli *run = &j->run;
     cli_stage(run, "read");
     int status = read_picture(run, run->inputs[0], 0, TXM_U16, &j->image);
@@ -67,8 +68,8 @@ static int read_all(erode_job *j) {
         status = read_gray(j, "the picture of levels", j->levels_path, &j->image, run->inputs[0],
                            &j->levels);
     if (!status)
-        status = read_gray(j, "the mask", j->mask_path, &j->desc.weathered, j->weathered,
-                           &j->desc.mask);
+        status = read_mask(run, &role, j->mask_path, j->desc.weathered.width, j->desc.weathered.height,
+                           j->weathered, &j->desc.mask);
     j->desc.width = j->image.width;
     j->desc.height = j->image.height;
     return status;

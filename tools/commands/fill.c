@@ -36,14 +36,6 @@ typedef struct fill_job {
     txm_image out;
 } fill_job;
 
-/* A mask of the picture's size. */
-static int read_like(fill_job *j, const char *what, const char *path, txm_image *image) {
-    const txm_image *first = &j->desc.image;
-    const int status = read_picture(&j->run, path, 0, TXM_U8, image);
-    if (status) return status;
-    return check_extent(&j->run, what, path, image, first->width, first->height, j->run.inputs[0]);
-}
-
 static int load_model(fill_job *j) {
     size_t size;
     unsigned char *bytes = file_read(j->model, &size);
@@ -60,10 +52,13 @@ static int load_model(fill_job *j) {
 }
 
 static int read_all(fill_job *j) {
+    static const mask_role hole = {"the mask", "is filled", TXM_MASK_REPLACES, 0};
+    static const mask_role source = {"the source mask", "is learned from", TXM_MASK_ALLOWS, 0};
     texsyn_fill_desc *d = &j->desc;
     int status = read_picture(&j->run, j->run.inputs[0], 0, TXM_U16, &d->image);
-    if (!status) status = read_like(j, "the mask", j->mask, &d->mask);
-    if (!status && j->source) status = read_like(j, "the source mask", j->source, &d->source);
+    const int w = d->image.width, h = d->image.height;
+    if (!status) status = read_mask(&j->run, &hole, j->mask, w, h, j->run.inputs[0], &d->mask);
+    if (!status) status = read_mask(&j->run, &source, j->source, w, h, j->run.inputs[0], &d->source);
     if (!status && j->model) status = load_model(j);
     if (!status)
         status =
@@ -74,18 +69,11 @@ static int read_all(fill_job *j) {
     return status;
 }
 
-/* How many pixels were replaced, by the rule of texsyn_fill. */
+/* How many pixels were replaced. */
 static double count_filled(const txm_image *mask) {
-    double count = 0;
-    for (int y = 0; y < mask->height; y++) {
-        const unsigned char *p = (const unsigned char *)txm_image_row_const(mask, y);
-        for (int x = 0; x < mask->width; x++, p += mask->channels) {
-            const int alpha = mask->channels % 2 == 0 ? p[mask->channels - 1] : 255;
-            const int gray =
-                mask->channels < 3 ? p[0] : (54 * p[0] + 183 * p[1] + 19 * p[2] + 128) / 256;
-            count += 2 * gray * alpha >= 255 * 255;
-        }
-    }
+    unsigned char *bytes = (unsigned char *)new_array((size_t)mask->width, (size_t)mask->height);
+    const double count = bytes ? (double)txm_mask_read(mask, TXM_MASK_REPLACES, bytes) : 0;
+    free(bytes);
     return count;
 }
 

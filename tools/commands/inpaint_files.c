@@ -39,22 +39,26 @@ static int read_mesh(inpaint_job *j) {
     return CLI_DONE;
 }
 
-/* A picture of the first one's size. */
-static int read_like(inpaint_job *j, const char *what, const char *path, txm_sample most,
-                     txm_image *image) {
+/* A map of the picture's size. */
+static int read_map(inpaint_job *j, const char *path, txm_image *image) {
     const txm_image *first = &j->desc.image;
-    const int status = read_picture(&j->run, path, 0, most, image);
+    const int status = read_picture(&j->run, path, 0, TXM_U16, image);
     if (status) return status;
-    return check_extent(&j->run, what, path, image, first->width, first->height, j->picture);
+    return check_extent(&j->run, "the map", path, image, first->width, first->height, j->picture);
 }
 
 int inpaint_read_all(inpaint_job *j) {
+    static const mask_role hole = {"the mask", "is replaced", TXM_MASK_REPLACES, 0};
+    static const mask_role apart = {"the mask", "is not spread", TXM_MASK_REPLACES, 1};
+    static const mask_role source = {"the source mask", "is copied from", TXM_MASK_ALLOWS, 0};
     texinpaint_desc *d = &j->desc;
     int status = read_picture(&j->run, j->picture, 0, TXM_U16, &d->image);
-    if (!status && j->mask) status = read_like(j, "the mask", j->mask, TXM_U8, &d->mask);
-    if (!status && j->source) status = read_like(j, "the source mask", j->source, TXM_U8, &d->source);
+    const int w = d->image.width, h = d->image.height;
+    if (!status)
+        status = read_mask(&j->run, j->dilate ? &apart : &hole, j->mask, w, h, j->picture, &d->mask);
+    if (!status) status = read_mask(&j->run, &source, j->source, w, h, j->picture, &d->source);
     for (int m = 0; m < d->map_count && !status; m++)
-        status = read_like(j, "the map", j->names[m], TXM_U16, &j->maps[m].image);
+        status = read_map(j, j->names[m], &j->maps[m].image);
     for (int m = 0; m <= d->map_count && !status; m++) {
         const txm_image *in = m ? &j->maps[m - 1].image : &d->image;
         status = check_picture_fits(&j->run, j->paths[m], in->width, in->height, in);

@@ -44,22 +44,19 @@ static int read_pair(knit_job *j) {
 }
 
 static int read_all(knit_job *j) {
+    static const mask_role layout = {"the layout", "is B", TXM_MASK_DIVIDES, 0};
     texsyn_knit_desc *d = &j->desc;
     cli *run = &j->run;
     cli_stage(run, "read");
     int status = read_pair(j);
     if (!status) status = check_picture_fits(run, run->output, d->a.width, d->a.height, &d->a);
-    if (!status) status = read_picture(run, j->layout, 0, TXM_U8, &d->layout);
     if (!status)
-        status = check_extent(run, "the layout", j->layout, &d->layout, d->a.width, d->a.height,
-                              run->inputs[0]);
+        status = read_mask(run, &layout, j->layout, d->a.width, d->a.height, run->inputs[0], &d->layout);
     if (status || !j->border) return status;
     status = read_picture(run, j->border, d->a.channels, TXM_U16, &d->border);
-    if (!status) status = read_picture(run, j->border_layout, 0, TXM_U8, &d->border_layout);
-    if (!status)
-        status = check_extent(run, "the layout", j->border_layout, &d->border_layout,
-                              d->border.width, d->border.height, j->border);
-    return status;
+    if (status) return status;
+    return read_mask(run, &layout, j->border_layout, d->border.width, d->border.height, j->border,
+                     &d->border_layout);
 }
 
 /* Give B the light of A. */

@@ -82,7 +82,8 @@ static int read_exemplar(patch_job *j, int e) {
 }
 
 /* A list of masks or guides, one for each exemplar. */
-static int read_for_exemplars(patch_job *j, const char *option, const char *list, int channels) {
+static int read_for_exemplars(patch_job *j, const char *option, const char *list, int are_masks) {
+    static const mask_role role = {"the mask", "is used", TXM_MASK_ALLOWS, 0};
     names n = {0};
     int status = patch_split(j, option, list, TEXPATCH_MAX_EXEMPLARS, &n);
     if (!status && n.count != j->desc.exemplar_count)
@@ -90,12 +91,14 @@ static int read_for_exemplars(patch_job *j, const char *option, const char *list
                           list, j->desc.exemplar_count);
     for (int e = 0; e < n.count && !status; e++) {
         texpatch_exemplar *x = &j->exemplars[e];
-        txm_image *image = channels ? &x->mask : &x->guide;
-        const int as_first = channels ? channels : j->exemplars[0].guide.channels; /* 0: as it is */
-        status = read_as(j, n.at[e], as_first, TXM_U8, image);
-        if (!status)
-            status = check_extent(&j->run, channels ? "the mask" : "the guide", n.at[e], image,
-                                  x->maps[0].width, x->maps[0].height, j->exemplar_names.at[e]);
+        const int w = x->maps[0].width, h = x->maps[0].height;
+        const char *like = j->exemplar_names.at[e];
+        if (are_masks) {
+            status = read_mask(&j->run, &role, n.at[e], w, h, like, &x->mask);
+            continue;
+        }
+        status = read_as(j, n.at[e], j->exemplars[0].guide.channels, TXM_U8, &x->guide);
+        if (!status) status = check_extent(&j->run, "the guide", n.at[e], &x->guide, w, h, like);
     }
     free(n.storage);
     return status;
@@ -109,6 +112,7 @@ static int read_sized(patch_job *j, const char *what, const char *path, int chan
 }
 
 static int read_kept(patch_job *j) {
+    static const mask_role role = {"the mask", "is kept", TXM_MASK_ALLOWS, 1};
     names n = {0};
     texpatch_desc *d = &j->desc;
     int status = patch_split(j, "--keep", j->kept_list, TEXPATCH_MAX_MAPS, &n);
@@ -119,7 +123,8 @@ static int read_kept(patch_job *j) {
         status = read_sized(j, "the picture", n.at[m], j->pictures[0][m].channels,
                             j->pictures[0][m].sample, &j->kept[m]);
     free(n.storage);
-    if (!status) status = read_sized(j, "the mask", j->keep, 1, TXM_U8, &d->keep);
+    if (!status)
+        status = read_mask(&j->run, &role, j->keep, d->width, d->height, "--size", &d->keep);
     d->kept = j->kept;
     return status;
 }
@@ -170,6 +175,7 @@ static int straighten_all(patch_job *j) {
 }
 
 int patch_read_all(patch_job *j) {
+    static const mask_role target = {"the mask", "follows the target", TXM_MASK_ALLOWS, 1};
     texpatch_desc *d = &j->desc;
     int status = CLI_DONE;
     for (int e = 0; e < d->exemplar_count && !status; e++) status = read_exemplar(j, e);
@@ -184,8 +190,9 @@ int patch_read_all(patch_job *j) {
     if (!status && j->target)
         status = read_sized(j, "the target", j->target, j->exemplars[0].guide.channels, TXM_U8,
                             &d->guide);
-    if (!status && j->target_mask)
-        status = read_sized(j, "the mask", j->target_mask, 1, TXM_U8, &d->guide_mask);
+    if (!status)
+        status = read_mask(&j->run, &target, j->target_mask, d->width, d->height, "--size",
+                           &d->guide_mask);
     if (!status && j->keep) status = read_kept(j);
     for (int e = 0; e < d->exemplar_count && !status; e++) status = even_exemplar(j, e);
     return status;

@@ -27,16 +27,8 @@ typedef struct relight_job {
     txm_image out;
 } relight_job;
 
-static int read_mask(relight_job *j, const char *path, const txm_image *picture, const char *like,
-                     txm_image *mask) {
-    if (!path) return CLI_DONE;
-    const int status = read_picture(&j->run, path, 0, TXM_U16, mask);
-    return status ? status
-                  : check_extent(&j->run, "the mask", path, mask, picture->width, picture->height,
-                                 like);
-}
-
 static int read_all(relight_job *j) {
+    static const mask_role role = {"the mask", "is compared", TXM_MASK_ALLOWS, 0};
     texsyn_relight_desc *d = &j->desc;
     cli *run = &j->run;
     cli_stage(run, "read");
@@ -44,8 +36,12 @@ static int read_all(relight_job *j) {
     if (!status)
         status = check_picture_fits(run, run->output, d->image.width, d->image.height, &d->image);
     if (!status) status = read_picture(run, j->like, 0, TXM_U16, &d->like);
-    if (!status) status = read_mask(j, j->mask, &d->image, run->inputs[0], &d->mask);
-    if (!status) status = read_mask(j, j->like_mask, &d->like, j->like, &d->like_mask);
+    if (!status)
+        status = read_mask(run, &role, j->mask, d->image.width, d->image.height, run->inputs[0],
+                           &d->mask);
+    if (!status)
+        status = read_mask(run, &role, j->like_mask, d->like.width, d->like.height, j->like,
+                           &d->like_mask);
     return status;
 }
 

@@ -70,13 +70,14 @@ static int write_labels(cli *run, const txm_image *labels, int is_indexed,
 static int run_segment(int argc, char **argv) {
     cli run;
     texsyn_segment_desc desc = {0};
+    static const mask_role role = {"the mask", "takes part", TXM_MASK_ALLOWS, 0};
     const char *mask_path = NULL;
     txm_image labels = {0};
     int is_gray = 0, count = 0, status;
     const cli_option options[] = {
         {CLI_INT, "--segments", "K", "how many textures, 1 to 16; default: as many as are found",
          &desc.segments, 1, TEXSYN_MAX_SEGMENTS},
-        {CLI_INPUT, "--mask", "M", "only where this picture of the same size is light", &mask_path,
+        {CLI_INPUT, "--mask", "M", "only where this picture of the same size is white", &mask_path,
          0, 0},
         {CLI_FLAG, "--transition", NULL, "label 254 for specks and thin parts", &desc.transition, 0,
          0},
@@ -94,10 +95,9 @@ static int run_segment(int argc, char **argv) {
 
     cli_stage(&run, "read");
     status = read_picture(&run, run.inputs[0], 0, TXM_U16, &desc.image);
-    if (!status && mask_path) status = read_picture(&run, mask_path, 0, TXM_U8, &desc.mask);
-    if (!status && mask_path)
-        status = check_extent(&run, "the mask", mask_path, &desc.mask, desc.image.width,
-                              desc.image.height, run.inputs[0]);
+    if (!status)
+        status = read_mask(&run, &role, mask_path, desc.image.width, desc.image.height, run.inputs[0],
+                           &desc.mask);
     if (!status)
         status = new_picture(&run, desc.image.width, desc.image.height, 1, TXM_U8, &labels);
     if (!status) {
