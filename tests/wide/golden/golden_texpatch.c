@@ -105,7 +105,7 @@ static uint64_t maps(txm_env *env) {
             normal[k][3 * i + 2] = txm_float((z / l + 1) / 2);
             height[k][i] = (uint16_t)(exemplar[k][3 * i] * 200);
             label[k][i] = (uint8_t)(exemplar[k][3 * i] / 64);
-            mask[i] = (uint8_t)(i % SIDE < 50 || i / SIDE < 50);
+            mask[i] = i % SIDE < 50 || i / SIDE < 50 ? 255 : 0;
         }
         in[k][0] = golden_image(exemplar[k], SIDE, SIDE, 3, TXM_U8);
         in[k][1] = golden_image(normal[k], SIDE, SIDE, 3, TXM_F32);
@@ -147,8 +147,8 @@ static uint64_t guided(txm_env *env) {
         for (int x = 0; x < WIDTH; x++) {
             const int i = y * WIDTH + x;
             guide[i] = (uint8_t)(x * 2 > y * 3 ? 255 : 0);
-            counts[i] = (uint8_t)(y > 8);
-            keep[i] = (uint8_t)(x > 60 && x < 80 && y > 30 && y < 60);
+            counts[i] = y > 8 ? 255 : 0;
+            keep[i] = x > 60 && x < 80 && y > 30 && y < 60 ? 255 : 0;
             for (int c = 0; c < 3; c++) kept[3 * i + c] = (uint8_t)(x * 2 + y + 20 * c);
         }
     }

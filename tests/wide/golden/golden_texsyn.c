@@ -100,8 +100,7 @@ static uint64_t blobs_fine(txm_env *env) {
 static uint64_t masked(txm_env *env) {
     golden_blobs(exemplar, SIDE, SIDE, 3);
     for (int i = 0; i < SIDE * SIDE; i++)
-        mask[i] = (uint8_t)((i % SIDE - 30) * (i % SIDE - 30) + (i / SIDE - 30) * (i / SIDE - 30) <
-                            29 * 29);
+        mask[i] = (i % SIDE - 30) * (i % SIDE - 30) + (i / SIDE - 30) * (i / SIDE - 30) < 29 * 29 ? 255 : 0;
     texsyn_learn_desc desc = learning(3);
     desc.mask = golden_image(mask, SIDE, SIDE, 1, TXM_U8);
     desc.threshold = 0.02f;
