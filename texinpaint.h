@@ -153,7 +153,7 @@ enum {
 /* How one of the further maps is treated; all zero: a picture. */
 typedef struct texinpaint_map {
     txm_image image; /* the size of desc.image, 1..4 channels, any sample type                  */
-    int is_normal;   /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2 in the
+    int is_normal;   /* 3 or 4 channels, the first three a unit vector (txm_normal_decode) in the
                         tangent space of the texture: turned with the pieces, kept at unit length.
                         x to the right, y up (OpenGL); 2 = y down (DirectX)                     */
     int is_label;    /* values are labels, not quantities: never blended or interpolated; without
@@ -2355,12 +2355,13 @@ static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const 
 static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     if (kind && kind->is_normal) {
-        const double x = 2 * (double)v[0] - 1;
-        const double y =
-            (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        const txm_sample sample = kind->image.sample;
+        const double x = txm_normal_decode((double)v[0], sample);
+        const double y = txm_normal_decode((double)v[1], sample) * (kind->is_normal == 2 ? 1 : -1) *
+                         (mirrored ? -1 : 1);
         v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
         v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
-        v[2] = txm_float(2 * (double)v[2] - 1);
+        v[2] = txm_float(txm_normal_decode((double)v[2], sample));
     }
 }
 
@@ -2369,14 +2370,16 @@ static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     const int channels = d->maps[map].channels;
     if (kind && kind->is_normal) {
+        const txm_sample sample = kind->image.sample;
         double x = (double)v[0] * (double)axis.x + (double)v[1] * (double)axis.y;
         double y = (double)v[1] * (double)axis.x - (double)v[0] * (double)axis.y;
         const double length = sqrt(x * x + y * y + (double)v[2] * (double)v[2]);
         const double scale = length > 0 ? 1 / length : 0;
         y *= (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
-        v[0] = txm_float(0.5 * (x * scale + 1));
-        v[1] = txm_float(0.5 * (y * scale + 1));
-        v[2] = length > 0 ? txm_float(0.5 * ((double)v[2] * scale + 1)) : 1;
+        const double z = length > 0 ? (double)v[2] * scale : 1;
+        v[0] = txm_float(txm_normal_encode(x * scale, sample));
+        v[1] = txm_float(txm_normal_encode(y * scale, sample));
+        v[2] = txm_float(txm_normal_encode(z, sample));
     } else if (txi_has_alpha(d, map)) {
         const float alpha = txm_minf(v[channels - 1], 1);
         for (int c = 0; c < channels - 1 && alpha > 1e-4f; c++) v[c] = v[c] / alpha;
@@ -4696,7 +4699,8 @@ static void txi_quantities_get(const txi_domain *d, const txi_quantities *q, uin
     for (int c = 0; c < channels; c++) out[c] = (double)txm_image_get(q->image, x, y, c);
     for (int c = 0; c + 1 < channels && q->has_alpha; c++)
         out[c] *= fmin(fmax(out[channels - 1], 0), 1);
-    for (int c = 0; c < 3 && q->is_normal; c++) out[c] = 2 * out[c] - 1;
+    for (int c = 0; c < 3 && q->is_normal; c++)
+        out[c] = txm_normal_decode(out[c], q->image->sample);
     if (q->is_normal && d->surface) { /* the vector in the tangent plane, as one in space */
         txm_dvec3 axis[2];
         txi_tangents(d, texel, q->is_normal, axis);
@@ -4726,7 +4730,8 @@ static void txi_quantities_set(const txi_domain *d, const txi_quantities *q, uin
             in[3] = in[4];
         }
         const double n = sqrt(in[0] * in[0] + in[1] * in[1] + in[2] * in[2]);
-        for (int c = 0; c < 3; c++) in[c] = n > 1e-6 ? (in[c] / n + 1) / 2 : c == 2 ? 1 : 0.5;
+        for (int c = 0; c < 3; c++)
+            in[c] = txm_normal_encode(n > 1e-6 ? in[c] / n : c == 2, q->image->sample);
     }
     for (int c = 0; c + 1 < channels && q->has_alpha; c++)
         in[c] = in[channels - 1] > 1e-6 ? in[c] / fmin(in[channels - 1], 1) : 0;

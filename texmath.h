@@ -790,6 +790,56 @@ static inline size_t txm_mask_read(const txm_image *mask, txm_mask_use use, uint
     return count;
 }
 
+/* ---- normal maps ------------------------------------------------------------------------ */
+
+/* One coordinate of a normal map's vector, -1..1, of the sample that txm_image_get returns, and back.
+   A flat surface must stay flat however it is turned or mirrored, so 128 of 255 is exactly 0, not
+   1/255, and 32768 of 65535 likewise:
+
+       8 bit: n = (s - 128) / 127,   16 bit: n = (s - 32768) / 32767,   float: n = 2 s - 1,
+
+   and the sample 0, which would be below, is -1. */
+static inline double txm_normal_decode(double value, txm_sample sample) {
+    const double n = sample == TXM_U8    ? (value * 255 - 128) / 127
+                     : sample == TXM_U16 ? (value * 65535 - 32768) / 32767
+                                         : 2 * value - 1;
+    return sample != TXM_F32 && n < -1 ? -1 : n;
+}
+static inline double txm_normal_encode(double n, txm_sample sample) {
+    return sample == TXM_U8    ? (n * 127 + 128) / 255
+           : sample == TXM_U16 ? (n * 32767 + 32768) / 65535
+                               : 0.5 + 0.5 * n;
+}
+
+/* The vector of pixel (x, y) of a normal map, in any length. */
+static inline void txm_normal_get(const txm_image *map, int x, int y, double n[3]) {
+    for (int c = 0; c < 3; c++)
+        n[c] = txm_normal_decode((double)txm_image_get(map, x, y, c), map->sample);
+}
+
+/* Does a picture look like a normal map? Its mean is within 30 degrees of (0, 0, 1), and at least 19
+   of 20 pixels have unit length (within 0.06) and do not point down. For warnings: a picture of one
+   light blue is one, too. Looks at about 4096 pixels, spread evenly. */
+static inline int txm_image_is_normals(const txm_image *image) {
+    const txm_image im = txm_image_resolve(*image);
+    const int step_x = (im.width - 1) / 64 + 1, step_y = (im.height - 1) / 64 + 1;
+    double sum[3] = {0, 0, 0}, seen = 0, good = 0;
+    if (im.channels < 3) return 0;
+    for (int y = step_y / 2; y < im.height; y += step_y) {
+        for (int x = step_x / 2; x < im.width; x += step_x) {
+            double n[3];
+            if (im.channels == 4 && !(txm_image_get(&im, x, y, 3) > 0)) continue;
+            txm_normal_get(&im, x, y, n);
+            const double square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+            seen += 1;
+            good += square > 0.94 * 0.94 && square < 1.06 * 1.06 && n[2] > -0.05;
+            for (int c = 0; c < 3; c++) sum[c] += n[c];
+        }
+    }
+    const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+    return seen > 0 && good >= 0.95 * seen && sum[2] > 0.866 * length;
+}
+
 /* ---- colour and alpha ------------------------------------------------------------------- */
 
 /* Alpha is straight: the last of 2 or 4 channels says how much of a pixel shows, and its colour is
@@ -1072,7 +1122,7 @@ typedef enum txm_content {
     TXM_COLOR = 0, /* 8 and 16 bits: sRGB, averaged in linear light; float: linear light already.
                       Weighted by alpha, if there is any                                        */
     TXM_DATA,      /* quantities, every channel by itself                                      */
-    TXM_NORMALS,   /* 3 or 4 channels, the first three unit vectors as (v + 1) / 2: averaged as
+    TXM_NORMALS,   /* 3 or 4 channels, the first three unit vectors (txm_normal_decode): averaged as
                       vectors and brought back to unit length; the fourth as data              */
     TXM_LABELS     /* not averaged: one of them is taken                                       */
 } txm_content;
@@ -1100,12 +1150,12 @@ static inline int txm_level_taps(int side, int x, double weight[3], double *tota
 
 /* The mean direction of vectors, v in any length, as samples. Those that cancel each other out
    have none: it is (0, 0, 1). */
-static inline void txm_level_normal(const double v[3], float *sample) {
+static inline void txm_level_normal(const double v[3], txm_sample kind, float *sample) {
     const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     const int is_none = !(length > 1e-6);
     for (int c = 0; c < 3; c++) {
         const double unit = is_none ? c == 2 : v[c] / length;
-        sample[c] = txm_float(0.5 + 0.5 * unit);
+        sample[c] = txm_float(txm_normal_encode(unit, kind));
     }
 }
 
@@ -1174,14 +1224,15 @@ static inline void txm_level_pixel(const txm_halving *h, int x, int y) {
             txm_level_load(h, row, 2 * x + u, pixel);
             if (weighs_alpha) txm_mean_add(&mean, pixel, weight);
             for (int c = 0; c < n && !weighs_alpha; c++) {
+                const int is_vector = h->content == TXM_NORMALS && c < 3;
                 const double sample = (double)pixel[c];
-                sum[c] += weight * (h->content == TXM_NORMALS && c < 3 ? 2 * sample - 1 : sample);
+                sum[c] += weight * (is_vector ? txm_normal_decode(sample, im->sample) : sample);
             }
         }
     }
     if (weighs_alpha) txm_mean_get(&mean, pixel);
     for (int c = 0; c < n && !weighs_alpha; c++) pixel[c] = txm_float(sum[c] / (across * along));
-    if (h->content == TXM_NORMALS) txm_level_normal(sum, pixel);
+    if (h->content == TXM_NORMALS) txm_level_normal(sum, im->sample, pixel);
     txm_level_store(h, x, y, pixel);
 }
 

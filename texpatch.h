@@ -149,7 +149,7 @@ enum {
 typedef struct texpatch_map {
     float weight;  /* 0..16: how much differences in this map count when pieces are matched;
                       0 = it follows the others                                              */
-    int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
+    int is_normal; /* 3 or 4 channels, the first three a unit vector (txm_normal_decode): blended
                       as vectors, kept at unit length, turned with the piece. x to the right,
                       y up (OpenGL); 2 = y down (DirectX)                                     */
     int is_label;  /* values are labels, not quantities: never blended or interpolated       */
@@ -1127,6 +1127,8 @@ typedef struct txp_rows {
     uint8_t *mask[TEXPATCH_MAX_EXEMPLARS]; /* 0: the pixel may not be used; NULL: all may be     */
 } txp_rows;
 
+#define TXP_WHOLE 0.001 /* pixels: so near to its centre nothing of its neighbours is seen */
+
 /* The bytes of a mask; *bytes is NULL without one. */
 static txm_status txp_read_mask(const txm_image *mask, txm_mask_use use, txm_arena *arena,
                                 uint8_t **bytes, txm_env *env) {
@@ -1136,6 +1138,17 @@ static txm_status txp_read_mask(const txm_image *mask, txm_mask_use use, txm_are
     if (!*bytes) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the masks");
     txm_mask_read(mask, use, *bytes);
     return TXM_OK;
+}
+
+/* Do the pixels between which (x, y) of the exemplar lies all count? */
+static int txp_counts(const uint8_t *mask, const txm_image *im, double x, double y) {
+    const int left = txm_clampi((int)floor(x + TXP_WHOLE), 0, im->width - 1);
+    const int top = txm_clampi((int)floor(y + TXP_WHOLE), 0, im->height - 1);
+    const int right = txm_clampi((int)ceil(x - TXP_WHOLE), 0, im->width - 1);
+    const int bottom = txm_clampi((int)ceil(y - TXP_WHOLE), 0, im->height - 1);
+    const uint8_t *upper = mask + (size_t)top * (size_t)im->width;
+    const uint8_t *lower = mask + (size_t)bottom * (size_t)im->width;
+    return upper[left] && upper[right] && lower[left] && lower[right];
 }
 
 /* One row of the stack at full size. */
@@ -1154,10 +1167,7 @@ static void txp_stack_row(void *context, int y) {
                      &r->setup->guides[sheet->exemplar], ex, ey, sheet->plain,
                      k->pixels + (size_t)y * k->pitch + (size_t)x * (size_t)s->bytes);
         if (r->bad && mask) {
-            const int ix = txm_clampi((int)floor(ex + 0.5), 0, im->width - 1);
-            const int iy = txm_clampi((int)floor(ey + 0.5), 0, im->height - 1);
-            r->bad[(size_t)y * (size_t)k->width + (size_t)x] =
-                mask[(size_t)iy * (size_t)im->width + (size_t)ix] == 0;
+            r->bad[(size_t)y * (size_t)k->width + (size_t)x] = (uint8_t)!txp_counts(mask, im, ex, ey);
         }
     }
 }
@@ -3416,12 +3426,28 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {
 
 /* ---- what a pixel shows ----------------------------------------------------------------- */
 
+#define TXP_LEAST_BEND 0.05 /* pixels: less is none */
+
 /* What a pixel of the output shows: place (x, y) of sheet `sheet`; sheet -1: a kept pixel. */
 typedef struct txp_pixel {
     int sheet, is_whole;
     double x, y;
     const float *tone; /* NULL: none */
 } txp_pixel;
+
+/* May all the pixels be used between which (x, y) of a sheet lies? */
+static int txp_is_usable(const txp_source *s, int sheet, double x, double y) {
+    const txp_stack *k = &s->stack[0];
+    if (!k->bad) return 1;
+    const int left = txm_clampi((int)floor(x), 0, k->wide[sheet] - 1);
+    const int top = txm_clampi((int)floor(y), 0, k->high[sheet] - 1);
+    const int right = txm_clampi(left + 1, 0, k->wide[sheet] - 1);
+    const int bottom = txm_clampi(top + 1, 0, k->high[sheet] - 1);
+    const size_t w = (size_t)k->width + 1;
+    const uint32_t *upper = k->bad + (size_t)(k->first[sheet] + top) * w;
+    const uint32_t *lower = k->bad + (size_t)(k->first[sheet] + bottom + 1) * w;
+    return lower[right + 1] - lower[left] == upper[right + 1] - upper[left];
+}
 
 static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     txp_pixel out = {-1, 1, 0, 0, NULL};
@@ -3446,8 +3472,13 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     out.x = p.x;
     out.y = p.y - s->stack[0].first[out.sheet];
     if (!job->bend) return out;
-    const double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
-    if (bx * bx + by * by >= 0.05 * 0.05) {
+    double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
+    while (bx * bx + by * by >= TXP_LEAST_BEND * TXP_LEAST_BEND &&
+           !txp_is_usable(s, out.sheet, out.x + bx, out.y + by)) {
+        bx /= 2; /* towards the place itself, which may be used */
+        by /= 2;
+    }
+    if (bx * bx + by * by >= TXP_LEAST_BEND * TXP_LEAST_BEND) {
         out.is_whole = 0;
         out.x += bx;
         out.y += by;
@@ -3475,9 +3506,11 @@ TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, 
 
 /* Turn the vector of a normal map with its piece and give it unit length. */
 static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
+    const txm_sample kind = u->maps[0][map].sample;
     const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* rows run downwards */
-    const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
-    double nz = 2 * (double)v[2] - 1;
+    const double nx = txm_normal_decode((double)v[0], kind);
+    const double ny = txm_normal_decode((double)v[1], kind) * down;
+    double nz = txm_normal_decode((double)v[2], kind);
     /* the axes of the sheet in the exemplar, orthogonal: a rotation, or a reflection */
     const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
     const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
@@ -3488,9 +3521,9 @@ static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, floa
         x = y = 0;
         nz = length = 1;
     }
-    v[0] = txm_float(0.5 + 0.5 * x / length);
-    v[1] = txm_float(0.5 + 0.5 * y / length * down);
-    v[2] = txm_float(0.5 + 0.5 * nz / length);
+    v[0] = txm_float(txm_normal_encode(x / length, kind));
+    v[1] = txm_float(txm_normal_encode(y / length * down, kind));
+    v[2] = txm_float(txm_normal_encode(nz / length, kind));
 }
 
 typedef struct txp_draw {

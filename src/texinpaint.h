@@ -153,7 +153,7 @@ enum {
 /* How one of the further maps is treated; all zero: a picture. */
 typedef struct texinpaint_map {
     txm_image image; /* the size of desc.image, 1..4 channels, any sample type                  */
-    int is_normal;   /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2 in the
+    int is_normal;   /* 3 or 4 channels, the first three a unit vector (txm_normal_decode) in the
                         tangent space of the texture: turned with the pieces, kept at unit length.
                         x to the right, y up (OpenGL); 2 = y down (DirectX)                     */
     int is_label;    /* values are labels, not quantities: never blended or interpolated; without

@@ -103,6 +103,7 @@ extern "C" {
 #include "texmath/number.h"
 #include "texmath/image.h"
 #include "texmath/mask.h"
+#include "texmath/normal.h"
 #include "texmath/alpha.h"
 #include "texmath/level.h"
 #include "texmath/light.h"

@@ -149,7 +149,7 @@ enum {
 typedef struct texpatch_map {
     float weight;  /* 0..16: how much differences in this map count when pieces are matched;
                       0 = it follows the others                                              */
-    int is_normal; /* 3 or 4 channels, the first three a unit vector as (v + 1) / 2: blended
+    int is_normal; /* 3 or 4 channels, the first three a unit vector (txm_normal_decode): blended
                       as vectors, kept at unit length, turned with the piece. x to the right,
                       y up (OpenGL); 2 = y down (DirectX)                                     */
     int is_label;  /* values are labels, not quantities: never blended or interpolated       */

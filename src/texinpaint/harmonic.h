@@ -54,7 +54,8 @@ static void txi_quantities_get(const txi_domain *d, const txi_quantities *q, uin
     for (int c = 0; c < channels; c++) out[c] = (double)txm_image_get(q->image, x, y, c);
     for (int c = 0; c + 1 < channels && q->has_alpha; c++)
         out[c] *= fmin(fmax(out[channels - 1], 0), 1);
-    for (int c = 0; c < 3 && q->is_normal; c++) out[c] = 2 * out[c] - 1;
+    for (int c = 0; c < 3 && q->is_normal; c++)
+        out[c] = txm_normal_decode(out[c], q->image->sample);
     if (q->is_normal && d->surface) { /* the vector in the tangent plane, as one in space */
         txm_dvec3 axis[2];
         txi_tangents(d, texel, q->is_normal, axis);
@@ -84,7 +85,8 @@ static void txi_quantities_set(const txi_domain *d, const txi_quantities *q, uin
             in[3] = in[4];
         }
         const double n = sqrt(in[0] * in[0] + in[1] * in[1] + in[2] * in[2]);
-        for (int c = 0; c < 3; c++) in[c] = n > 1e-6 ? (in[c] / n + 1) / 2 : c == 2 ? 1 : 0.5;
+        for (int c = 0; c < 3; c++)
+            in[c] = txm_normal_encode(n > 1e-6 ? in[c] / n : c == 2, q->image->sample);
     }
     for (int c = 0; c + 1 < channels && q->has_alpha; c++)
         in[c] = in[channels - 1] > 1e-6 ? in[c] / fmin(in[channels - 1], 1) : 0;

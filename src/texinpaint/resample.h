@@ -301,12 +301,13 @@ static void txi_read_pixel(const txi_domain *d, const txi_kernel *kernel, const 
 static void txi_pack(const txi_domain *d, int map, txm_vec2 axis, int mirrored, float *v) {
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     if (kind && kind->is_normal) {
-        const double x = 2 * (double)v[0] - 1;
-        const double y =
-            (2 * (double)v[1] - 1) * (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
+        const txm_sample sample = kind->image.sample;
+        const double x = txm_normal_decode((double)v[0], sample);
+        const double y = txm_normal_decode((double)v[1], sample) * (kind->is_normal == 2 ? 1 : -1) *
+                         (mirrored ? -1 : 1);
         v[0] = txm_float(x * (double)axis.x - y * (double)axis.y);
         v[1] = txm_float(x * (double)axis.y + y * (double)axis.x);
-        v[2] = txm_float(2 * (double)v[2] - 1);
+        v[2] = txm_float(txm_normal_decode((double)v[2], sample));
     }
 }
 
@@ -315,14 +316,16 @@ static void txi_unpack(const txi_domain *d, int map, txm_vec2 axis, int mirrored
     const texinpaint_map *kind = map ? &d->desc->maps[map - 1] : NULL;
     const int channels = d->maps[map].channels;
     if (kind && kind->is_normal) {
+        const txm_sample sample = kind->image.sample;
         double x = (double)v[0] * (double)axis.x + (double)v[1] * (double)axis.y;
         double y = (double)v[1] * (double)axis.x - (double)v[0] * (double)axis.y;
         const double length = sqrt(x * x + y * y + (double)v[2] * (double)v[2]);
         const double scale = length > 0 ? 1 / length : 0;
         y *= (kind->is_normal == 2 ? 1 : -1) * (mirrored ? -1 : 1);
-        v[0] = txm_float(0.5 * (x * scale + 1));
-        v[1] = txm_float(0.5 * (y * scale + 1));
-        v[2] = length > 0 ? txm_float(0.5 * ((double)v[2] * scale + 1)) : 1;
+        const double z = length > 0 ? (double)v[2] * scale : 1;
+        v[0] = txm_float(txm_normal_encode(x * scale, sample));
+        v[1] = txm_float(txm_normal_encode(y * scale, sample));
+        v[2] = txm_float(txm_normal_encode(z, sample));
     } else if (txi_has_alpha(d, map)) {
         const float alpha = txm_minf(v[channels - 1], 1);
         for (int c = 0; c < channels - 1 && alpha > 1e-4f; c++) v[c] = v[c] / alpha;

@@ -2,6 +2,7 @@
 #define TEXMATH_LEVEL_H
 
 #include "alpha.h"
+#include "normal.h"
 
 /* ---- kernel: levels of detail ----------------------------------------------------------- */
 
@@ -10,7 +11,7 @@ typedef enum txm_content {
     TXM_COLOR = 0, /* 8 and 16 bits: sRGB, averaged in linear light; float: linear light already.
                       Weighted by alpha, if there is any                                        */
     TXM_DATA,      /* quantities, every channel by itself                                      */
-    TXM_NORMALS,   /* 3 or 4 channels, the first three unit vectors as (v + 1) / 2: averaged as
+    TXM_NORMALS,   /* 3 or 4 channels, the first three unit vectors (txm_normal_decode): averaged as
                       vectors and brought back to unit length; the fourth as data              */
     TXM_LABELS     /* not averaged: one of them is taken                                       */
 } txm_content;
@@ -38,12 +39,12 @@ static inline int txm_level_taps(int side, int x, double weight[3], double *tota
 
 /* The mean direction of vectors, v in any length, as samples. Those that cancel each other out
    have none: it is (0, 0, 1). */
-static inline void txm_level_normal(const double v[3], float *sample) {
+static inline void txm_level_normal(const double v[3], txm_sample kind, float *sample) {
     const double length = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
     const int is_none = !(length > 1e-6);
     for (int c = 0; c < 3; c++) {
         const double unit = is_none ? c == 2 : v[c] / length;
-        sample[c] = txm_float(0.5 + 0.5 * unit);
+        sample[c] = txm_float(txm_normal_encode(unit, kind));
     }
 }
 
@@ -112,14 +113,15 @@ static inline void txm_level_pixel(const txm_halving *h, int x, int y) {
             txm_level_load(h, row, 2 * x + u, pixel);
             if (weighs_alpha) txm_mean_add(&mean, pixel, weight);
             for (int c = 0; c < n && !weighs_alpha; c++) {
+                const int is_vector = h->content == TXM_NORMALS && c < 3;
                 const double sample = (double)pixel[c];
-                sum[c] += weight * (h->content == TXM_NORMALS && c < 3 ? 2 * sample - 1 : sample);
+                sum[c] += weight * (is_vector ? txm_normal_decode(sample, im->sample) : sample);
             }
         }
     }
     if (weighs_alpha) txm_mean_get(&mean, pixel);
     for (int c = 0; c < n && !weighs_alpha; c++) pixel[c] = txm_float(sum[c] / (across * along));
-    if (h->content == TXM_NORMALS) txm_level_normal(sum, pixel);
+    if (h->content == TXM_NORMALS) txm_level_normal(sum, im->sample, pixel);
     txm_level_store(h, x, y, pixel);
 }
 

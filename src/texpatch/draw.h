@@ -85,9 +85,11 @@ TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, 
 
 /* Turn the vector of a normal map with its piece and give it unit length. */
 static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
+    const txm_sample kind = u->maps[0][map].sample;
     const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* rows run downwards */
-    const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
-    double nz = 2 * (double)v[2] - 1;
+    const double nx = txm_normal_decode((double)v[0], kind);
+    const double ny = txm_normal_decode((double)v[1], kind) * down;
+    double nz = txm_normal_decode((double)v[2], kind);
     /* the axes of the sheet in the exemplar, orthogonal: a rotation, or a reflection */
     const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
     const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
@@ -98,9 +100,9 @@ static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, floa
         x = y = 0;
         nz = length = 1;
     }
-    v[0] = txm_float(0.5 + 0.5 * x / length);
-    v[1] = txm_float(0.5 + 0.5 * y / length * down);
-    v[2] = txm_float(0.5 + 0.5 * nz / length);
+    v[0] = txm_float(txm_normal_encode(x / length, kind));
+    v[1] = txm_float(txm_normal_encode(y / length * down, kind));
+    v[2] = txm_float(txm_normal_encode(nz / length, kind));
 }
 
 typedef struct txp_draw {
