@@ -77,6 +77,28 @@ int check_extent(cli *run, const char *what, const char *path, const txm_image *
                     image->width, image->height, width, height, like);
 }
 
+int widen_picture(cli *run, txm_image *image) {
+    txm_image wide;
+    if (image->sample != TXM_U8) return CLI_DONE;
+    const int status =
+        new_picture(run, image->width, image->height, image->channels, TXM_U16, &wide);
+    const size_t count = (size_t)image->width * (size_t)image->height * (size_t)image->channels;
+    const uint8_t *from = (const uint8_t *)image->pixels;
+    for (size_t i = 0; i < count && !status; i++) {
+        ((uint16_t *)wide.pixels)[i] = (uint16_t)(from[i] * 257);
+    }
+    if (status) return status;
+    image_free(image);
+    *image = wide;
+    return CLI_DONE;
+}
+
+void warn_of_normals(cli *run, const char *path, const txm_image *image, const char *option) {
+    if (txm_image_is_normals(image))
+        cli_warn(run, "'%s' looks like a normal map but is treated as colors; if it is one, add %s", path,
+                 option);
+}
+
 /* How white the lightest pixel of a mask is, in percent. */
 static int lightest_of(const txm_image *mask) {
     double most = 0;

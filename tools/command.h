@@ -55,6 +55,13 @@ int decode_picture(cli *run, const char *path, const unsigned char *bytes, size_
 int check_extent(cli *run, const char *what, const char *path, const txm_image *image, int width,
                  int height, const char *like);
 
+/* Convert a picture of 8 bits a sample to 16; one that has 16 stays. An exit status. */
+int widen_picture(cli *run, txm_image *image);
+
+/* Warn of a picture that looks like a normal map but is not to be treated as one. option: how to say
+   that it is, such as "--normal 2". */
+void warn_of_normals(cli *run, const char *path, const txm_image *image, const char *option);
+
 /* A mask of a command. Which pixels count is told by txm_mask_use in texmath.h, and only there. */
 typedef struct mask_role {
     const char *what;  /* "the mask"                                                    */

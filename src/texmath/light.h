@@ -2,6 +2,7 @@
 #define TEXMATH_LIGHT_H
 
 #include "alpha.h"
+#include "mask.h"
 
 /* ---- kernel: uneven light --------------------------------------------------------------- */
 
@@ -14,8 +15,8 @@
 typedef struct txm_even_desc {
     txm_image image; /* colours: 8 and 16 bits sRGB-encoded, float linear light; alpha says how much
                         each pixel counts                                                         */
-    txm_image mask;  /* 1 channel, the size of the image: only pixels of at least half its range
-                        count, though all are changed; pixels NULL: all count                     */
+    txm_image mask;  /* the size of the image: only pixels where it counts (txm_mask_at) are looked
+                        at, though all are changed; pixels NULL: all are                          */
     float radius;    /* pixels, TXM_EVEN_LEAST..TXM_EVEN_MOST: changes of light wider than this are
                         taken out; a wave of twice this length loses half its height. 0 = half the
                         smaller side of the image                                                 */
@@ -80,7 +81,7 @@ static inline int txm_light_edge(int side, int k, int count) {
 
 /* how much pixel (x, y) counts, 0..1 */
 static inline double txm_light_weight(const txm_image *image, const txm_image *mask, int x, int y) {
-    if (mask->pixels && !(txm_image_get(mask, x, y, 0) >= 0.5f)) return 0;
+    if (mask->pixels && !txm_mask_at(mask, x, y)) return 0;
     if (!txm_image_has_alpha(image)) return 1;
     return (double)txm_clampf(txm_image_get(image, x, y, image->channels - 1), 0, 1);
 }
@@ -348,13 +349,7 @@ static inline txm_status txm_light_check(const txm_even_desc *desc, txm_env *env
         return txm_fail_numbers(env, TXM_BAD_ARGUMENT, "radius must be 0 (default) or # to #",
                                 (uint64_t)TXM_EVEN_LEAST, (uint64_t)TXM_EVEN_MOST);
     if (!desc->mask.pixels) return TXM_OK;
-    status = txm_image_check(&desc->mask, "mask", 0, env);
-    if (status != TXM_OK) return status;
-    if (desc->mask.channels > 1 || desc->mask.width != desc->image.width ||
-        desc->mask.height != desc->image.height)
-        return txm_fail_at(env, TXM_BAD_ARGUMENT, "mask",
-                           "must have 1 channel and the size of the image");
-    return TXM_OK;
+    return txm_mask_check(&desc->mask, "mask", desc->image.width, desc->image.height, 0, env);
 }
 
 /* the radius that is meant */

@@ -76,7 +76,10 @@ static int run_learn(int argc, char **argv) {
     if (status) return status;
 
     cli_stage(&run, "read");
-    status = read_picture(&run, run.inputs[0], 0, TXM_U8, &desc.example);
+    status = read_picture(&run, run.inputs[0], 0, TXM_U16, &desc.example);
+    if (!status && desc.example.sample == TXM_U16)
+        cli_warn(&run, "'%s' has 16 bits a sample; a model does not keep that: add --deep to 'texkit synth' "
+                 "for textures of 16 bits", run.inputs[0]);
     if (!status)
         status = read_mask(&run, &role, mask_path, desc.example.width, desc.example.height,
                            run.inputs[0], &desc.mask);
@@ -114,17 +117,17 @@ static const cli_manual synth_manual = {
     "make new texture from a model or a picture",
     "The input is a model of 'texkit learn' or a picture, from which a model is learned\n"
     "first (the file's content decides, not its name). OUT ends in .png, .jpg, .tif,\n"
-    ".webp, .tga or .bmp; it has the channels of the exemplar. BMP and WebP store gray as RGB; JPEG\n"
-    "has no alpha. A\n"
-    "higher --quality makes more sweeps over the picture: its statistics get closer to the\n"
+    ".webp, .tga or .bmp; it has the channels of the exemplar and, in .png and .tif, the 16 bits of\n"
+    "a picture. BMP and WebP store gray as RGB; JPEG has no alpha. A higher --quality makes more\n"
+    "sweeps over the picture: its statistics get closer to the\n"
     "exemplar's, and it takes longer. Uneven light of a picture is evened out before it is\n"
     "learned, as by 'texkit learn'.\n",
     "  texkit synth gravel.txs -o gravel-large.png --size 2048x1024\n"
     "  texkit synth gravel.jpg -o tile.png --size 512x512 --tileable --seed 7\n",
     1, "exemplar or model", 0, "take a smaller size", NULL};
 
-/* The input as a model: loaded if it is one, else learned from the picture. */
-static int get_model(cli *run, int even, texsyn_model **model) {
+/* The input as a model: loaded if it is one, else learned from the picture, whose samples it then has. */
+static int get_model(cli *run, int even, texsyn_model **model, txm_sample *sample) {
     const char *path = run->inputs[0];
     texsyn_learn_desc learn = {0};
     char extension[8];
@@ -144,9 +147,14 @@ static int get_model(cli *run, int even, texsyn_model **model) {
                               "it to 'texkit learn'", path);
     } else if (!strcmp(extension, ".txs") && !image_is_known(bytes, size)) {
         status = check_result(run, result, path);
-    } else if ((status = decode_picture(run, path, bytes, size, 0, TXM_U8, &learn.example))) {
+    } else if ((status = decode_picture(run, path, bytes, size, 0, TXM_U16, &learn.example))) {
         /* said already */
     } else if (!(status = check_picture_path(run, run->output, 0, 0, learn.example.channels))) {
+        file_extension(run->output, extension);
+        *sample = image_takes_16_bits(extension) ? learn.example.sample : TXM_U8;
+        if (*sample != learn.example.sample)
+            cli_warn(run, "'%s' has 16 bits a sample, '%s' takes 8; use .png for all of them", path,
+                     run->output);
         status = even_example(run, even, &learn);
         cli_stage(run, "learn");
         learn.seed = run->seed;
@@ -162,7 +170,7 @@ static int get_model(cli *run, int even, texsyn_model **model) {
 
 static int run_synth(int argc, char **argv) {
     cli run;
-    int extent[2] = {0, 0}, tileable = 0, quality = 0, even = EVEN_AUTO, status;
+    int extent[2] = {0, 0}, tileable = 0, quality = 0, is_deep = 0, even = EVEN_AUTO, status;
     const cli_option options[] = {
         {CLI_EXTENT, "--size", "WxH", "width and height of the result in pixels", extent, 1,
          MAX_SIDE},
@@ -170,10 +178,13 @@ static int run_synth(int argc, char **argv) {
          0},
         {CLI_INT, "--quality", "N", "fewer or more sweeps, -2 (fast) to 2 (best); default 0",
          &quality, -2, 2},
+        {CLI_FLAG, "--deep", NULL, "16 bits a sample; a picture of 16 bits gives them by itself", &is_deep,
+         0, 0},
         {CLI_INT, "--even", "R", EVEN_HELP, &even, 0, EVEN_MOST},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     texsyn_model *model = NULL;
+    txm_sample sample = TXM_U8;
     txm_image out = {0};
 
     if (cli_begin(&run, &synth_manual, options, argc, argv, &status)) return status;
@@ -184,18 +195,18 @@ static int run_synth(int argc, char **argv) {
                         extent[1], TEXSYN_MAX_PIXELS);
     status = check_even(&run, even);
     if (!status) status = check_picture_path(&run, run.output, extent[0], extent[1], 0);
-    if (!status) status = get_model(&run, even, &model);
+    if (!status) status = get_model(&run, even, &model, &sample);
     if (!status)
         status = check_picture_path(&run, run.output, extent[0], extent[1], texsyn_channels(model));
+    if (!status)
+        status = new_picture(&run, extent[0], extent[1], texsyn_channels(model),
+                             is_deep ? TXM_U16 : sample, &out);
+    if (!status) status = check_picture_fits(&run, run.output, extent[0], extent[1], &out);
     if (status) goto done;
 
     cli_stage(&run, "synthesise");
-    out.width = extent[0];
-    out.height = extent[1];
-    out.channels = texsyn_channels(model);
-    out.pixels = malloc((size_t)out.width * (size_t)out.height * (size_t)out.channels);
     texsyn_synth_desc desc = {model, out.width, out.height, tileable, quality, run.seed};
-    txm_status result = out.pixels ? texsyn_synthesize(&desc, &run.env, out) : TXM_OUT_OF_MEMORY;
+    const txm_status result = texsyn_synthesize(&desc, &run.env, out);
     if (result != TXM_OK) {
         status = check_result(&run, result, run.inputs[0]);
         goto done;
@@ -209,7 +220,7 @@ static int run_synth(int argc, char **argv) {
         printf("%s: %d x %d pixels, %.1f s\n", run.output, out.width, out.height,
                cli_seconds(&run));
 done:
-    free(out.pixels);
+    image_free(&out);
     texsyn_model_free(model);
     return status;
 }

@@ -40,10 +40,15 @@ static int read_mesh(inpaint_job *j) {
 }
 
 /* A map of the picture's size. */
-static int read_map(inpaint_job *j, const char *path, txm_image *image) {
+static int read_map(inpaint_job *j, int map, txm_image *image) {
+    const char *path = j->names[map];
+    char option[24];
     const txm_image *first = &j->desc.image;
     const int status = read_picture(&j->run, path, 0, TXM_U16, image);
     if (status) return status;
+    snprintf(option, sizeof option, "--normal %d", map + 1);
+    if (!j->maps[map].is_normal && !j->maps[map].is_label)
+        warn_of_normals(&j->run, path, image, option);
     return check_extent(&j->run, "the map", path, image, first->width, first->height, j->picture);
 }
 
@@ -58,7 +63,7 @@ int inpaint_read_all(inpaint_job *j) {
         status = read_mask(&j->run, j->dilate ? &apart : &hole, j->mask, w, h, j->picture, &d->mask);
     if (!status) status = read_mask(&j->run, &source, j->source, w, h, j->picture, &d->source);
     for (int m = 0; m < d->map_count && !status; m++)
-        status = read_map(j, j->names[m], &j->maps[m].image);
+        status = read_map(j, m, &j->maps[m].image);
     for (int m = 0; m <= d->map_count && !status; m++) {
         const txm_image *in = m ? &j->maps[m - 1].image : &d->image;
         status = check_picture_fits(&j->run, j->paths[m], in->width, in->height, in);

@@ -36,11 +36,13 @@ static int read_pair(knit_job *j) {
     if (!status) status = read_picture(run, run->inputs[1], 0, TXM_U16, &d->b);
     if (status || (d->a.channels == d->b.channels && d->a.sample == d->b.sample)) return status;
     const int channels = d->a.channels > d->b.channels ? d->a.channels : d->b.channels;
-    const txm_sample most = d->a.sample == d->b.sample ? d->a.sample : TXM_U8;
     image_free(&d->a);
     image_free(&d->b);
-    status = read_picture(run, run->inputs[0], channels, most, &d->a);
-    return status ? status : read_picture(run, run->inputs[1], channels, most, &d->b);
+    status = read_picture(run, run->inputs[0], channels, TXM_U16, &d->a);
+    if (!status) status = read_picture(run, run->inputs[1], channels, TXM_U16, &d->b);
+    if (status || d->a.sample == d->b.sample) return status;
+    status = widen_picture(run, &d->a);
+    return status ? status : widen_picture(run, &d->b);
 }
 
 static int read_all(knit_job *j) {

@@ -38,26 +38,20 @@ int patch_name_outputs(patch_job *j) {
 
 /* ---- reading ------------------------------------------------------------------------------- */
 
-/* Convert 8 bits to 16. */
-static int widen(patch_job *j, txm_image *image) {
-    txm_image wide;
-    const int status =
-        new_picture(&j->run, image->width, image->height, image->channels, TXM_U16, &wide);
-    const size_t count = (size_t)image->width * (size_t)image->height * (size_t)image->channels;
-    const uint8_t *from = (const uint8_t *)image->pixels;
-    for (size_t i = 0; i < count && !status; i++) {
-        ((uint16_t *)wide.pixels)[i] = (uint16_t)(from[i] * 257);
-    }
-    image_free(image);
-    *image = wide;
-    return status;
-}
-
 /* Read a picture with so many channels of that sample type. */
 static int read_as(patch_job *j, const char *path, int channels, txm_sample sample,
                    txm_image *image) {
     const int status = read_picture(&j->run, path, channels, sample, image);
-    return !status && image->sample != sample ? widen(j, image) : status;
+    return !status && image->sample != sample ? widen_picture(&j->run, image) : status;
+}
+
+/* Normals that are treated as colors get colors of their own where they are turned or averaged. */
+static void warn_of_map(patch_job *j, int map, const char *name, const txm_image *image) {
+    const texpatch_map *kind = &j->maps[map];
+    char option[24];
+    if (kind->is_normal || kind->is_label || kind->is_data) return;
+    snprintf(option, sizeof option, "--normal %d", map);
+    warn_of_normals(&j->run, name, image, option);
 }
 
 /* Exemplar e and its maps; all exemplars have the channels and the depths of the first. */
@@ -73,6 +67,7 @@ static int read_exemplar(patch_job *j, int e) {
         const char *name = m ? j->map_names[e].at[m - 1] : path;
         if (e) status = read_as(j, name, first->channels, first->sample, image);
         else status = read_picture(&j->run, name, 0, TXM_U16, image);
+        if (!status && !e) warn_of_map(j, m, name, image);
         if (!status && m)
             status = check_extent(&j->run, "the map", name, image, x->maps[0].width, x->maps[0].height,
                                   path);

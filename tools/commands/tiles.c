@@ -150,8 +150,9 @@ static txm_status draw_preview(cli *run, const textiles_set *set, const textiles
     return TXM_OK;
 }
 
-/* Make atlases, preview and tiles.json in memory, then write all of them into the folder. */
-static int write_set(cli *run, const textiles_set *set, const textiles_layout *layout) {
+/* Make atlases, preview and tiles.json, with those samples in the maps, in memory, then write all of them into the folder. */
+static int write_set(cli *run, const textiles_set *set, const textiles_layout *layout,
+                     const txm_sample *samples) {
     const int maps = textiles_map_count(set);
     txm_image atlas[TEXTILES_MAX_MAPS], preview = {0};
     cli_file files[TEXTILES_MAX_MAPS + 1 + DOCUMENTS];
@@ -163,8 +164,8 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
 
     cli_stage(run, "draw");
     for (int m = 0; m < maps && !status; m++) {
-        status = new_picture(run, layout->width, layout->height, textiles_channels(set, m), TXM_U8,
-                             &atlas[m]);
+        status = new_picture(run, layout->width, layout->height, textiles_channels(set, m),
+                             samples[m], &atlas[m]);
         if (status) break;
         status = check_result(run, textiles_draw_atlas(set, layout, m, &run->env, atlas[m]),
                               run->inputs[0]);
@@ -172,7 +173,7 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
     while (side > 2 && side * layout->size > PREVIEW_PIXELS) side--;
     if (!status)
         status = new_picture(run, side * layout->size, side * layout->size, atlas[0].channels,
-                             TXM_U8, &preview);
+                             samples[0], &preview);
     if (!status)
         status = check_result(run, draw_preview(run, set, layout, &atlas[0], &preview),
                               run->inputs[0]);
@@ -243,7 +244,7 @@ static int read_list(cli *run, const char *list, const char *option, int most, p
 static int take_map(cli *run, photos *p, const char *path) {
     textiles_exemplar *x = &p->exemplars[0];
     txm_image *image = &p->images[0][x->map_count];
-    const int status = read_picture(run, path, 0, TXM_U8, image);
+    const int status = read_picture(run, path, 0, TXM_U16, image);
     if (status) return status;
     x->map_count++;
     if (image->width == p->images[0][0].width && image->height == p->images[0][0].height)
@@ -254,7 +255,7 @@ static int take_map(cli *run, photos *p, const char *path) {
 }
 
 static int take_photo(cli *run, photos *p, const char *path) {
-    const int status = read_picture(run, path, p->images[0][0].channels, TXM_U8,
+    const int status = read_picture(run, path, p->images[0][0].channels, TXM_U16,
                                     &p->images[p->count][0]);
     if (status) return status;
     p->exemplars[p->count].maps = p->images[p->count];
@@ -269,6 +270,15 @@ static const char *name_photo(const cli *run, int e, const char *names[2], char 
     if (e == 0) return run->inputs[0];
     cli_take_name(list, ",", path);
     return path;
+}
+
+/* If one photograph has 16 bits a sample, all have. */
+static int same_depth(cli *run, photos *p) {
+    int is_deep = 0, status = CLI_DONE;
+    for (int i = 0; i < p->count; i++) is_deep |= p->images[i][0].sample == TXM_U16;
+    for (int i = 0; i < p->count && is_deep && !status; i++)
+        status = widen_picture(run, &p->images[i][0]);
+    return status;
 }
 
 /* Even the light of all photographs, but not of the maps. names: --edges and --more, for warnings. */
@@ -409,6 +419,7 @@ static int run_tiles(int argc, char **argv) {
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     photos p;
+    txm_sample samples[TEXTILES_MAX_MAPS];
     textiles_set *set = NULL;
     textiles_layout layout;
     textiles_joints joints;
@@ -439,7 +450,7 @@ static int run_tiles(int argc, char **argv) {
     if (status) return status;
 
     cli_stage(&run, "read");
-    status = read_picture(&run, run.inputs[0], 0, TXM_U8, &p.images[0][0]);
+    status = read_picture(&run, run.inputs[0], 0, TXM_U16, &p.images[0][0]);
     if (!status) {
         p.exemplars[0].maps = p.images[0];
         p.exemplars[0].map_count = p.count = 1;
@@ -459,6 +470,7 @@ static int run_tiles(int argc, char **argv) {
         cli_stage(&run, "straighten");
         status = straighten_photos(&run, &p, desc.data_maps, (const char *[2]){edges, more});
     }
+    if (!status) status = same_depth(&run, &p);
     if (!status) status = even_photos(&run, &p, even, (const char *[2]){edges, more});
     if (status) goto done;
 
@@ -477,7 +489,8 @@ static int run_tiles(int argc, char **argv) {
         goto done;
     }
     set_figures(&run, set, &layout, &joints);
-    status = write_set(&run, set, &layout);
+    for (int m = 0; m < p.exemplars[0].map_count; m++) samples[m] = p.images[0][m].sample;
+    status = write_set(&run, set, &layout, samples);
     if (!status && !run.quiet)
         printf("%s: %d tiles, atlas %d x %d, steps at joints %.3f of those inside (worst pair %.3f), "
                "%.1f s\n", run.output, textiles_count(set), layout.width, layout.height, joints.mean,

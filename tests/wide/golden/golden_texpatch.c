@@ -168,8 +168,10 @@ static uint64_t guided(txm_env *env) {
 static uint64_t again(txm_env *env) {
     static uint8_t part[WIDTH * HEIGHT];
     golden_noise(exemplar[0], SIDE, SIDE, 3);
-    for (int i = 0; i < WIDTH * HEIGHT; i++)
-        part[i] = (uint8_t)(i % WIDTH > 20 && i % WIDTH < 60 && i / WIDTH > 30 && i / WIDTH < 66);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        const int x = i % WIDTH, y = i / WIDTH;
+        part[i] = x > 20 && x < 60 && y > 30 && y < 66 ? 255 : 0;
+    }
     const txm_image map = golden_image(exemplar[0], SIDE, SIDE, 3, TXM_U8);
     const txm_image anew = golden_image(part, WIDTH, HEIGHT, 1, TXM_U8);
     const txm_image image = golden_image(out, WIDTH, HEIGHT, 3, TXM_U8);
