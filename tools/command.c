@@ -117,13 +117,14 @@ static int check_share(cli *run, const mask_role *role, const char *path, const 
     enum { MUCH = 90 }; /* percent */
     const int replaces = role->use == TXM_MASK_REPLACES, allows = role->use == TXM_MASK_ALLOWS;
     char text[160];
+    if (!replaces && !allows) return CLI_DONE; /* the library tells of a layout without a border */
     if (share <= 0) {
         snprintf(text, sizeof text, "nothing of it counts, for its lightest pixel is %d %% white; what "
                  "is at least half white %s", lightest_of(mask), role->white);
         if (!role->is_optional)
             return cli_fail(run, CLI_FAILED, "%s '%s': %s", role->what, path, text);
         cli_warn(run, "%s '%s': %s", role->what, path, text);
-    } else if (share >= 1 && replaces && !role->is_optional) {
+    } else if (share >= 1 && replaces) {
         return cli_fail(run, CLI_FAILED, "%s '%s' covers the whole picture; what is white %s, so leave "
                         "some of it black", role->what, path, role->white);
     } else if (share >= 1) {

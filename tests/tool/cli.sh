@@ -141,7 +141,7 @@ check "RGBA comes back from TGA" png_is r.png 9 9 6
 check "learn --mask" run 0 learn sand.png --mask mask.png -o masked.txs
 { printf 'P5\n48 48\n255\n'; head -c 2304 /dev/zero; } >black.pgm
 { printf 'P5\n48 40\n255\n'; head -c 1920 /dev/zero; } >short.pgm
-refuses 1 "" learn sand.png --mask black.pgm -o n.txs
+refuses 1 "nothing of it counts" learn sand.png --mask black.pgm -o n.txs
 refuses 1 "48 x 48" learn sand.png --mask short.pgm -o n.txs
 refuses 1 "cannot read" learn sand.png --mask missing.png -o n.txs
 
@@ -155,8 +155,8 @@ check "relight --strength 0 changes nothing" run 0 relight sand.png --like rgba.
 check "the same pixels" sh -c "'$texkit' relight sand.png --like sand.png -o sand.bmp --strength 0 --quiet &&
     cmp sand.bmp same.bmp"
 check "relight with masks" run 0 relight sand.png --like rgba.png -o relit.png --mask mask.png --like-mask mask.png
-refuses 1 "fewer than 16" relight sand.png --like rgba.png -o n.png --mask black.pgm
-refuses 1 "fewer than 16" relight sand.png --like rgba.png -o n.png --like-mask black.pgm
+refuses 1 "nothing of it counts" relight sand.png --like rgba.png -o n.png --mask black.pgm
+refuses 1 "nothing of it counts" relight sand.png --like rgba.png -o n.png --like-mask black.pgm
 refuses 1 "48 x 48" relight sand.png --like rgba.png -o n.png --like-mask short.pgm
 refuses 1 "cannot read" relight sand.png --like missing.png -o n.png
 refuses 2 "add --like" relight sand.png -o n.png
@@ -177,7 +177,7 @@ check "erode by a picture of levels" run 0 erode rgba.png --weathered sand.png -
 check "erode, other cracks" run 0 erode sand.png --weathered gray.png --level 0.5 -o other.png --seed 2 --share 0.2 \
     --mask mask.png
 refuses 1 "at least 32 x 32" erode sand.png --weathered tiny.png --level 1 -o n.png
-refuses 1 "fewer than 1024" erode sand.png --weathered sand.png --level 1 -o n.png --mask black.pgm
+refuses 1 "nothing of it counts" erode sand.png --weathered sand.png --level 1 -o n.png --mask black.pgm
 refuses 1 "48 x 48" erode sand.png --weathered sand.png --level 1 -o n.png --levels short.pgm
 refuses 1 "48 x 48" erode sand.png --weathered sand.png --level 1 -o n.png --mask short.pgm
 refuses 1 "cannot read" erode sand.png --weathered missing.png --level 1 -o n.png

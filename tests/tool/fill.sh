@@ -56,8 +56,8 @@ refuses 1 "No such file" fill missing.png --mask mask-disc.png -o n.png
 refuses 1 "No such file" fill sand.png --mask missing.png -o n.png
 refuses 1 "make it 96 x 96" fill sand.png --mask small.png -o n.png
 refuses 1 "the source mask" fill sand.png --mask mask-disc.png --source small.png -o n.png
-refuses 1 "mask: is empty" fill sand.png --mask mask-none.png -o n.png
-refuses 1 "mask: covers the whole picture" fill sand.png --mask mask-all.png -o n.png
-refuses 1 "256" fill sand.png --mask mask-disc.png --source mask-none.png -o n.png
+refuses 1 "nothing of it counts" fill sand.png --mask mask-none.png -o n.png
+refuses 1 "covers the whole picture" fill sand.png --mask mask-all.png -o n.png
+refuses 1 "the source mask" fill sand.png --mask mask-disc.png --source mask-none.png -o n.png
 refuses 1 "channels" fill gray.png --mask mask-disc.png --model sand.txs -o n.png
 refuses 1 "sand.png" fill sand.png --mask mask-disc.png --model sand.png -o n.png

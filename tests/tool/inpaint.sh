@@ -35,7 +35,7 @@ for threads in 1 3; do
 done
 check "a hole at the border" run 0 inpaint bars.png --mask mask-edge.png -o edge.png
 check "only the hole changes" look kept bars.png mask-edge.png edge.png 0
-check "no hole" run 0 inpaint bars.png --mask mask-none.png -o none.png
+check "no hole" run 0 inpaint bars.png --mask mask-none.png -o none.png --quiet
 check "nothing changes" look near bars.png mask-all.png none.png 0
 check "16 bits" run 0 inpaint deep.png --mask mask-disc.png -o deep-out.png
 check "only the hole changes, in 16 bits" look kept deep.png mask-disc.png deep-out.png
@@ -51,7 +51,7 @@ check "only the hole changes" look kept bars.png mask-disc.png p.png
 check "--smooth" run 0 inpaint bars.png --mask mask-disc.png -o p.png --smooth
 check "only the hole changes" look kept bars.png mask-disc.png p.png
 check "values between those around it" look within mask-disc.png p.png 40 210
-check "--source" run 0 inpaint bars.png --mask mask-disc.png -o p.png --source mask-all.png
+check "--source" run 0 inpaint bars.png --mask mask-disc.png -o p.png --source mask-all.png --quiet
 check "all may be copied from: the same picture" cmp a.png p.png
 refuses 1 "" inpaint bars.png --mask mask-disc.png -o n.png --source mask-none.png
 

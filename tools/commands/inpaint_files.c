@@ -53,7 +53,7 @@ static int read_map(inpaint_job *j, int map, txm_image *image) {
 }
 
 int inpaint_read_all(inpaint_job *j) {
-    static const mask_role hole = {"the mask", "is replaced", TXM_MASK_REPLACES, 0};
+    static const mask_role hole = {"the mask", "is replaced", TXM_MASK_REPLACES, 1};
     static const mask_role apart = {"the mask", "is not spread", TXM_MASK_REPLACES, 1};
     static const mask_role source = {"the source mask", "is copied from", TXM_MASK_ALLOWS, 0};
     texinpaint_desc *d = &j->desc;

@@ -137,7 +137,8 @@ static txm_status draw_preview(cli *run, const textiles_set *set, const textiles
     if (status == TXM_BAD_ARGUMENT) /* frames whose classes do not all fit: put them side by side */
         for (int i = 0; i < columns * rows; i++) tiles[i] = i % textiles_count(set);
     else if (status != TXM_OK) return status;
-    const size_t texel = (size_t)out->channels, row = (size_t)out->width * texel;
+    const size_t texel = (size_t)out->channels * txm_sample_bytes(out->sample);
+    const size_t row = (size_t)out->width * texel;
     for (int i = 0; i < columns * rows; i++) {
         int px, py, step;
         textiles_place(layout, tiles[i], &px, &py, &step, NULL);
