@@ -19,7 +19,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "kit"))
 from png import Png, Wrong, need  # noqa: E402
 
-SIDE, X, Y, RADIUS = 96, 47.3, 50.6, 22.4
+SIDE, X, Y, RADIUS = 128, 95.3, 98.6, 22.4
 
 
 def write(path, channels, bits, samples):

@@ -16,7 +16,7 @@ warns() {
 cd "$tmp" || exit 1
 look draw .
 
-patch="patch object.png --size 96x96 --passes 1"
+patch="patch object.png --size 128x128 --passes 1"
 for mask in hard soft noise alpha deep part; do
     check "patch --mask $mask" run 0 $patch -o p.png --mask $mask.png
     check "patch --keep-mask $mask" run 0 $patch -o k.png --mask hard.png --keep object.png --keep-mask $mask.png
