@@ -66,7 +66,7 @@ static int expected(const txm_image *im, const txm_image *half, txm_content cont
             shown += w * alpha;
             for (int c = 0; c < n; c++) {
                 double g = (double)txm_image_get(im, u, v, c);
-                if (content == TXM_NORMALS && c < 3) g = 2 * g - 1;
+                if (content == TXM_NORMALS && c < 3) g = txm_normal_decode(g, im->sample);
                 if (is_coded && c < colours) g = decode(g);
                 sum[c] += (content == TXM_COLOR && c < colours ? w * alpha : w) * g;
             }
@@ -78,7 +78,7 @@ static int expected(const txm_image *im, const txm_image *half, txm_content cont
         if (c < 3) length += sum[c] * sum[c];
     }
     for (int c = 0; c < 3 && content == TXM_NORMALS; c++)
-        out[c] = 0.5 + 0.5 * sum[c] / sqrt(length);
+        out[c] = txm_normal_encode(sum[c] / sqrt(length), im->sample);
     return content != TXM_COLOR || shown > 0;
 }
 

@@ -385,7 +385,8 @@ static void test_bad(void **state) {
     assert_int_equal(txm_uneven(NULL, NULL, &stops), TXM_BAD_ARGUMENT);
     assert_int_equal(txm_uneven(&good, NULL, NULL), TXM_BAD_ARGUMENT);
     desc = good;
-    desc.mask = other.image; /* three channels */
+    desc.mask = other.image;
+    desc.mask.channels = 5;
     assert_int_equal(txm_even(&desc, NULL, &p.image), TXM_BAD_ARGUMENT);
     desc.mask.channels = 1;
     desc.mask.height--;
