@@ -245,7 +245,8 @@ typedef struct texpatch_source {
 } texpatch_source;
 TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, int y);
 
-/* Synthesise a part again: the pixels of `again`, a mask that replaces, of the size of the output. Any remaining steps are done first. All other pixels are kept, and the part is fitted to
+/* Synthesise a part again: the pixels of `again`, a mask that replaces, of the size of the output.
+   Any remaining steps are done first. All other pixels are kept, and the part is fitted to
    them. The following steps do the work, in time proportional to the part's bounding box.
    guide, guide_mask   as in the desc, copied; the job follows them from now on. NULL = unchanged */
 TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again,
@@ -265,7 +266,7 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
    planks, roofs, cloth. */
 typedef struct texpatch_straight_desc {
     txm_image photo; /* the pattern is looked for in it; not modified, need not live on             */
-    txm_image mask;  /* TXM_U8, 1 channel, the size of photo: under 128 = do not look here; pixels
+    txm_image mask;  /* the size of photo: looks only where it counts (txm_mask_at); pixels
                         NULL: look everywhere. Transparent pixels are not looked at either          */
     float focal;     /* focal length of the camera, in longer sides of the photograph as it was
                         taken, 0.1..100 (that for 35 mm film over 36); 0 = 0.85. It only

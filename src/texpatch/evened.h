@@ -34,7 +34,7 @@ typedef struct txp_graying {
 
 /* How much a pixel counts, 0..1. */
 static inline double txp_visible(const txm_image *im, const txm_image *mask, int x, int y) {
-    if (mask->pixels && ((const uint8_t *)txm_image_row_const(mask, y))[x] < 128) return 0;
+    if (mask->pixels && !txm_mask_at(mask, x, y)) return 0;
     if (im->channels == 2 || im->channels == 4)
         return (double)txm_clampf(txm_image_get(im, x, y, im->channels - 1), 0, 1);
     return 1;

@@ -148,7 +148,8 @@ static txm_status txp_straight_check(const texpatch_straight_desc *d, txm_env *e
     if (!d) return txm_fail(env, TXM_BAD_ARGUMENT, "desc is NULL");
     txm_status status = txp_check_picture(&d->photo, "photo", env);
     if (status == TXM_OK && d->mask.pixels)
-        status = txp_check_mask(&d->mask, "mask", d->photo.width, d->photo.height, env);
+        status = txm_mask_check(&d->mask, "mask", d->photo.width, d->photo.height,
+                                TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (!txp_is_within(d->focal, 0, 100) || (d->focal > 0 && d->focal < 0.1f))
         return txm_fail(env, TXM_BAD_ARGUMENT, "focal must be 0.1 to 100 longer sides, or 0");

@@ -98,6 +98,7 @@ static int name_pictures(straighten_job *j) {
 }
 
 static int read_pictures(straighten_job *j) {
+    static const mask_role role = {"the mask", "is looked at", TXM_MASK_ALLOWS, 0};
     cli *run = &j->run;
     int status = CLI_DONE;
     cli_stage(run, "read");
@@ -110,11 +111,9 @@ static int read_pictures(straighten_job *j) {
         if (!status)
             status = check_picture_fits(run, j->outputs[m], image->width, image->height, image);
     }
-    if (status || !j->mask_path) return status;
-    status = read_picture(run, j->mask_path, 1, TXM_U8, &j->mask);
     if (status) return status;
-    return check_extent(run, "the mask", j->mask_path, &j->mask, j->pictures[0].width,
-                        j->pictures[0].height, run->inputs[0]);
+    return read_mask(run, &role, j->mask_path, j->pictures[0].width, j->pictures[0].height,
+                     run->inputs[0], &j->mask);
 }
 
 static int write_pictures(straighten_job *j) {
