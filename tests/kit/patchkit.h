@@ -260,9 +260,9 @@ static inline txm_image draw_normals(const txm_image *hills, int sense, txm_samp
     for (int y = 0; y < im.height; y++) {
         for (int x = 0; x < im.width; x++) {
             const txm_vec3 n = normal_of(hills, x, y, sense);
-            txm_image_set(&im, x, y, 0, 0.5f + 0.5f * n.x);
-            txm_image_set(&im, x, y, 1, 0.5f + 0.5f * n.y);
-            txm_image_set(&im, x, y, 2, 0.5f + 0.5f * n.z);
+            const float v[3] = {n.x, n.y, n.z};
+            for (int c = 0; c < 3; c++)
+                txm_image_set(&im, x, y, c, txm_float(txm_normal_encode((double)v[c], sample)));
         }
     }
     return im;
@@ -399,7 +399,8 @@ static inline void check_lengths(const txm_image *normals) {
         for (int x = 0; x < normals->width; x++) {
             double sum = 0;
             for (int c = 0; c < 3; c++) {
-                const double v = 2 * (double)txm_image_get(normals, x, y, c) - 1;
+                const double v =
+                    txm_normal_decode((double)txm_image_get(normals, x, y, c), normals->sample);
                 sum += v * v;
             }
             if (!(fabs(sqrt(sum) - 1) <= 1.0 / 127))

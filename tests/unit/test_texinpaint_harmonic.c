@@ -460,7 +460,7 @@ static void test_normals_are_unit(void **state) {
     for (int i = 0; i < PIXELS; i++) {
         double n = 0;
         for (int c = 0; c < 3; c++) {
-            const double v = normals_out[3 * i + c] / 127.5 - 1;
+            const double v = txm_normal_decode(normals_out[3 * i + c] / 255.0, TXM_U8);
             n += v * v;
         }
         if (mask[i]) assert_true(fabs(n - 1) < 0.03);

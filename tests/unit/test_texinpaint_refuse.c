@@ -87,13 +87,16 @@ static void test_pictures(void **state) {
     d.mask.height = SIDE - 1;
     refuse(&d, TXM_BAD_ARGUMENT, ALL);
     d = good;
-    d.mask = view(real, SIDE, SIDE, 1, TXM_F32);
+    d.mask.channels = 5;
     refuse(&d, TXM_BAD_ARGUMENT, ALL);
     d = good;
     d.source = view(mask, SIDE - 1, SIDE, 1, TXM_U8);
     refuse(&d, TXM_BAD_ARGUMENT, BEGIN);
-    d.source = view(real, SIDE, SIDE, 1, TXM_U16);
+    d.source = view(mask, SIDE, SIDE, 1, TXM_U8);
+    d.source.stride = SIDE - 1;
     refuse(&d, TXM_BAD_ARGUMENT, BEGIN);
+    d.source = view(real, SIDE, SIDE, 1, TXM_U16); /* black: nothing may be copied */
+    refuse(&d, TXM_TOO_SMALL, BEGIN);
     /* nothing to copy from */
     memset(mask, 255, sizeof mask);
     refuse(&good, TXM_TOO_SMALL, ALL);

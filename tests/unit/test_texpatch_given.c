@@ -131,7 +131,7 @@ static void test_keep(void **state) {
 
     /* everything is kept; nothing is */
     d.tileable = 0;
-    memset(d.keep.pixels, 1, SIDE * SIDE);
+    memset(d.keep.pixels, 255, SIDE * SIDE);
     txm_image out = made(&d, NULL);
     assert_true(is_same(&out, &kept[0]));
     memset(d.keep.pixels, 0, SIDE * SIDE);

@@ -250,7 +250,8 @@ static void test_register(void **state) {
                 compared++;
                 of_turn[s[i].turn]++;
                 for (int c = 0; c < 3; c++) {
-                    const double got = 2 * (double)txm_image_get(&normals, x, y, c) - 1;
+                    const double sample = (double)txm_image_get(&normals, x, y, c);
+                    const double got = txm_normal_decode(sample, normals.sample);
                     if (!(fabs(got - (double)v[c]) < 0.02))
                         fail_msg("(%d, %d) turn %d channel %d: %g, not %g", x, y, s[i].turn, c, got,
                                  (double)v[c]);

@@ -387,7 +387,7 @@ static void test_learn_failing(void **state) {
     (void)state;
     static uint8_t pixels[32 * 32], mask[32 * 32];
     draw_patches(pixels, 32, 32, 1, 8, 30, 4);
-    memset(mask, 1, sizeof mask);
+    memset(mask, 255, sizeof mask);
     texsyn_learn_desc d = learn_desc(view_bytes(pixels, 32, 32, 1), 1);
     d.mask = view_bytes(mask, 32, 32, 1);
     d.levels = 2;

@@ -124,7 +124,7 @@ static void test_scarce(void **state) {
             draw_leaves(pictures[h], 5, (hidden)h);
             for (int i = 0; i < PIXELS; i++) {
                 uint8_t *p = pictures[h] + 4 * i;
-                mask[i] = i % SIDE > 20;
+                mask[i] = i % SIDE > 20 ? 255 : 0;
                 if (kind == 0 || (kind == 1 && i % 997 == 0)) continue;
                 p[3] = 0;
                 hide(p, i, (hidden)h);
