@@ -817,6 +817,28 @@ static inline void txm_normal_get(const txm_image *map, int x, int y, double n[3
         n[c] = txm_normal_decode((double)txm_image_get(map, x, y, c), map->sample);
 }
 
+/* Turn a normal, the samples v of a map, with its picture, and give it unit length. axes: where x and y
+   of the result point in the map, each right and down, at right angles and of any length but 0: a
+   rotation or a reflection. is_down: green points down in the picture, not up. */
+static inline void txm_normal_turn(const double axes[4], int is_down, txm_sample sample, float v[3]) {
+    const double down = is_down ? 1 : -1; /* rows run downwards */
+    const double nx = txm_normal_decode((double)v[0], sample);
+    const double ny = txm_normal_decode((double)v[1], sample) * down;
+    double nz = txm_normal_decode((double)v[2], sample);
+    const double lx = sqrt(axes[0] * axes[0] + axes[1] * axes[1]);
+    const double ly = sqrt(axes[2] * axes[2] + axes[3] * axes[3]);
+    double x = (axes[0] * nx + axes[1] * ny) / lx;
+    double y = (axes[2] * nx + axes[3] * ny) / ly;
+    double length = sqrt(x * x + y * y + nz * nz);
+    if (!(length > 1e-6)) {
+        x = y = 0;
+        nz = length = 1;
+    }
+    v[0] = txm_float(txm_normal_encode(x / length, sample));
+    v[1] = txm_float(txm_normal_encode(y / length * down, sample));
+    v[2] = txm_float(txm_normal_encode(nz / length, sample));
+}
+
 /* Does a picture look like a normal map? Its mean is within 30 degrees of (0, 0, 1), and at least 19
    of 20 pixels have unit length (within 0.06) and do not point down. For warnings: a picture of one
    light blue is one, too. Looks at about 4096 pixels, spread evenly. */

@@ -3507,24 +3507,8 @@ TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, 
 
 /* Turn the vector of a normal map with its piece and give it unit length. */
 static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
-    const txm_sample kind = u->maps[0][map].sample;
-    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* rows run downwards */
-    const double nx = txm_normal_decode((double)v[0], kind);
-    const double ny = txm_normal_decode((double)v[1], kind) * down;
-    double nz = txm_normal_decode((double)v[2], kind);
-    /* the axes of the sheet in the exemplar, orthogonal: a rotation, or a reflection */
-    const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
-    const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
-    double x = (sheet->xx * nx + sheet->yx * ny) / lx;
-    double y = (sheet->xy * nx + sheet->yy * ny) / ly;
-    double length = sqrt(x * x + y * y + nz * nz);
-    if (!(length > 1e-6)) {
-        x = y = 0;
-        nz = length = 1;
-    }
-    v[0] = txm_float(txm_normal_encode(x / length, kind));
-    v[1] = txm_float(txm_normal_encode(y / length * down, kind));
-    v[2] = txm_float(txm_normal_encode(nz / length, kind));
+    const double axes[4] = {sheet->xx, sheet->yx, sheet->xy, sheet->yy};
+    txm_normal_turn(axes, u->kinds[map].is_normal == 2, u->maps[0][map].sample, v);
 }
 
 typedef struct txp_draw {
@@ -5767,22 +5751,9 @@ static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha
 }
 
 /* Turn a normal with the picture: by the rotation that is nearest to the map m. */
-static void txp_turn_normal(const double m[4], int is_down, float *v) {
-    const double a = m[0] + m[3], b = m[2] - m[1], l = sqrt(a * a + b * b);
-    const double down = is_down ? 1 : -1; /* rows run downwards */
-    const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
-    double nz = 2 * (double)v[2] - 1;
-    if (!(l > 0)) return;
-    /* a vector of the photograph, seen from the result */
-    double x = (a * nx + b * ny) / l, y = (a * ny - b * nx) / l;
-    double length = sqrt(x * x + y * y + nz * nz);
-    if (!(length > 1e-6)) {
-        x = y = 0;
-        nz = length = 1;
-    }
-    v[0] = txm_float(0.5 + 0.5 * x / length);
-    v[1] = txm_float(0.5 + 0.5 * y / length * down);
-    v[2] = txm_float(0.5 + 0.5 * nz / length);
+static void txp_rectify_normal(const txp_rectifying *q, const double m[4], float *v) {
+    const double a = m[0] + m[3], b = m[2] - m[1], axes[4] = {a, b, -b, a};
+    if (a != 0 || b != 0) txm_normal_turn(axes, q->kind.is_normal == 2, q->image->sample, v);
 }
 
 /* One pixel of the result, whose middle lies at (px, py) of the photograph. */
@@ -5812,7 +5783,7 @@ static void txp_rectify_pixel(const txp_rectifying *q, double px, double py, con
     } else {
         for (int c = 0; c < n; c++) v[c] = txm_float(sum[c] / (samples * samples * unit));
     }
-    if (q->kind.is_normal) txp_turn_normal(m, q->kind.is_normal == 2, v);
+    if (q->kind.is_normal) txp_rectify_normal(q, m, v);
 }
 
 static void txp_rectify_row(void *context, int y) {

@@ -85,24 +85,8 @@ TEXPATCH_API texpatch_source texpatch_source_at(const texpatch_job *job, int x, 
 
 /* Turn the vector of a normal map with its piece and give it unit length. */
 static void txp_normal(const txp_setup *u, int map, const txp_sheet *sheet, float *v) {
-    const txm_sample kind = u->maps[0][map].sample;
-    const double down = u->kinds[map].is_normal == 2 ? 1 : -1; /* rows run downwards */
-    const double nx = txm_normal_decode((double)v[0], kind);
-    const double ny = txm_normal_decode((double)v[1], kind) * down;
-    double nz = txm_normal_decode((double)v[2], kind);
-    /* the axes of the sheet in the exemplar, orthogonal: a rotation, or a reflection */
-    const double lx = sqrt(sheet->xx * sheet->xx + sheet->yx * sheet->yx);
-    const double ly = sqrt(sheet->xy * sheet->xy + sheet->yy * sheet->yy);
-    double x = (sheet->xx * nx + sheet->yx * ny) / lx;
-    double y = (sheet->xy * nx + sheet->yy * ny) / ly;
-    double length = sqrt(x * x + y * y + nz * nz);
-    if (!(length > 1e-6)) {
-        x = y = 0;
-        nz = length = 1;
-    }
-    v[0] = txm_float(txm_normal_encode(x / length, kind));
-    v[1] = txm_float(txm_normal_encode(y / length * down, kind));
-    v[2] = txm_float(txm_normal_encode(nz / length, kind));
+    const double axes[4] = {sheet->xx, sheet->yx, sheet->xy, sheet->yy};
+    txm_normal_turn(axes, u->kinds[map].is_normal == 2, u->maps[0][map].sample, v);
 }
 
 typedef struct txp_draw {

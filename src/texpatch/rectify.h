@@ -73,22 +73,9 @@ static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha
 }
 
 /* Turn a normal with the picture: by the rotation that is nearest to the map m. */
-static void txp_turn_normal(const double m[4], int is_down, float *v) {
-    const double a = m[0] + m[3], b = m[2] - m[1], l = sqrt(a * a + b * b);
-    const double down = is_down ? 1 : -1; /* rows run downwards */
-    const double nx = 2 * (double)v[0] - 1, ny = (2 * (double)v[1] - 1) * down;
-    double nz = 2 * (double)v[2] - 1;
-    if (!(l > 0)) return;
-    /* a vector of the photograph, seen from the result */
-    double x = (a * nx + b * ny) / l, y = (a * ny - b * nx) / l;
-    double length = sqrt(x * x + y * y + nz * nz);
-    if (!(length > 1e-6)) {
-        x = y = 0;
-        nz = length = 1;
-    }
-    v[0] = txm_float(0.5 + 0.5 * x / length);
-    v[1] = txm_float(0.5 + 0.5 * y / length * down);
-    v[2] = txm_float(0.5 + 0.5 * nz / length);
+static void txp_rectify_normal(const txp_rectifying *q, const double m[4], float *v) {
+    const double a = m[0] + m[3], b = m[2] - m[1], axes[4] = {a, b, -b, a};
+    if (a != 0 || b != 0) txm_normal_turn(axes, q->kind.is_normal == 2, q->image->sample, v);
 }
 
 /* One pixel of the result, whose middle lies at (px, py) of the photograph. */
@@ -118,7 +105,7 @@ static void txp_rectify_pixel(const txp_rectifying *q, double px, double py, con
     } else {
         for (int c = 0; c < n; c++) v[c] = txm_float(sum[c] / (samples * samples * unit));
     }
-    if (q->kind.is_normal) txp_turn_normal(m, q->kind.is_normal == 2, v);
+    if (q->kind.is_normal) txp_rectify_normal(q, m, v);
 }
 
 static void txp_rectify_row(void *context, int y) {

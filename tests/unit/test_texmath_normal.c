@@ -38,6 +38,36 @@ static void test_round_trip(void **state) {
     assert_near(txm_normal_decode(1, TXM_U16), 1, 1e-15);
 }
 
+/* Flat stays exactly flat however it is turned; a quarter turn moves x to y and back. */
+static void test_turn(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        const txm_image m = view(&memory, 1, 1, 3, samples[kind]);
+        txm_rng rng = txm_rng_make(3, 1);
+        for (int k = 0; k < 200; k++) {
+            const double a = (double)random_float(&rng, 0.1f, 2), b = (double)random_float(&rng, -2, 2);
+            const double mirror = k % 2 ? 1 : -1, axes[4] = {a, b, -b * mirror, a * mirror};
+            for (int c = 0; c < 3; c++)
+                txm_image_set(&m, 0, 0, c, txm_float(txm_normal_encode(c == 2, m.sample)));
+            float v[3], back[3];
+            for (int c = 0; c < 3; c++) v[c] = back[c] = txm_image_get(&m, 0, 0, c);
+            txm_normal_turn(axes, k % 3 == 0, m.sample, v);
+            for (int c = 0; c < 3; c++) {
+                txm_image_set(&m, 0, 0, c, v[c]);
+                assert_true(txm_image_get(&m, 0, 0, c) == back[c]);
+            }
+        }
+        const double quarter[4] = {0, 1, -1, 0};
+        float v[3];
+        for (int c = 0; c < 3; c++)
+            v[c] = txm_float(txm_normal_encode(c == 0 ? 0.6 : c == 2 ? 0.8 : 0, m.sample));
+        txm_normal_turn(quarter, 1, m.sample, v); /* right is the new up */
+        assert_near(txm_normal_decode((double)v[0], m.sample), 0, 1e-6);
+        assert_near(txm_normal_decode((double)v[1], m.sample), -0.6, 1e-6);
+        assert_near(txm_normal_decode((double)v[2], m.sample), 0.8, 1e-6);
+    }
+}
+
 /* Bumps look like a normal map in every form; noise, grays, and normals that lie on their side do not. */
 static void test_looks(void **state) {
     (void)state;
@@ -75,6 +105,7 @@ static void test_looks(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trip), cmocka_unit_test(test_looks)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_round_trip), cmocka_unit_test(test_turn),
+                                       cmocka_unit_test(test_looks)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
