@@ -132,7 +132,8 @@ static int even_exemplar(patch_job *j, int e) {
         const texpatch_map *kind = &j->maps[m];
         txm_image *image = &j->pictures[e][m];
         const char *path = m ? j->map_names[e].at[m - 1] : j->exemplar_names.at[e];
-        if (kind->is_normal || kind->is_label || kind->is_data || (m && image->channels < 3)) continue;
+        if (kind->is_normal || kind->is_label || kind->is_data) continue;
+        if (m && (image->channels < 3 || txm_image_is_normals(image))) continue;
         int own;
         status = even_picture(&j->run, path, m ? used : j->even, mask, image, &own);
         if (m == 0) used = own;
