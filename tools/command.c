@@ -242,8 +242,7 @@ int check_picture_fits(cli *run, const char *path, int width, int height, const 
     file_extension(path, extension);
     const int status = check_picture_path(run, path, width, height, image->channels);
     if (!status && image->sample == TXM_U16 && !image_takes_16_bits(extension))
-        return cli_fail(run, CLI_USAGE, "cannot write '%s': of these formats only PNG and TIFF take "
-                        "16 bits a sample; use .png", path);
+        cli_warn(run, "'%s' takes 8 of the 16 bits a sample; use .png for all of them", path);
     return status;
 }
 

@@ -120,7 +120,7 @@ int mark_maps(cli *run, const char *option, const char *list, int low, int high,
    channels not known yet. */
 int check_picture_path(cli *run, const char *path, int width, int height, int channels);
 
-/* The same for a picture of such channels and depth. */
+/* The same for a picture of such channels; one of 16 bits that the format cannot hold gets a warning. */
 int check_picture_fits(cli *run, const char *path, int width, int height, const txm_image *image);
 
 /* Encode the picture for the output's extension and write it. */

@@ -150,11 +150,7 @@ static int get_model(cli *run, int even, texsyn_model **model, txm_sample *sampl
     } else if ((status = decode_picture(run, path, bytes, size, 0, TXM_U16, &learn.example))) {
         /* said already */
     } else if (!(status = check_picture_path(run, run->output, 0, 0, learn.example.channels))) {
-        file_extension(run->output, extension);
-        *sample = image_takes_16_bits(extension) ? learn.example.sample : TXM_U8;
-        if (*sample != learn.example.sample)
-            cli_warn(run, "'%s' has 16 bits a sample, '%s' takes 8; use .png for all of them", path,
-                     run->output);
+        *sample = learn.example.sample;
         status = even_example(run, even, &learn);
         cli_stage(run, "learn");
         learn.seed = run->seed;

@@ -122,6 +122,8 @@ static int draw_lines(cli *run, const texedges_set *e, int layer, int over,
     const int status = new_picture(run, e->width, e->height, 3, TXM_U8, out);
     if (status) return status;
     const txm_image *under = over == OVER_PICTURE ? image : layers;
+    if (under->sample != TXM_U8 && over == OVER_PICTURE)
+        cli_warn(run, "'%s' has 16 bits a sample; lines are drawn over 8 of them", run->inputs[0]);
     for (int y = 0; y < e->height && over != OVER_BLACK; y++) {
         for (int x = 0; x < e->width; x++) {
             for (int k = 0; k < 3; k++)

@@ -185,6 +185,7 @@ int image_decode(image_job *job, const unsigned char *bytes, size_t size, txm_im
     if (ok) {
         const int own = image->channels == 2 ? 4 : image->channels;
         const txm_sample sample = job->deep ? image->sample : TXM_U8;
+        if (sample != image->sample) image_warn(&s, "it has 16 bits a sample, of which 8 are used");
         ok = image_convert(image, job->channels ? job->channels : own, sample) &&
              image_turn(image, s.orientation);
         if (!ok) *why = image_no_memory;
@@ -282,7 +283,7 @@ static int hand_over(image_target *t, int ok, unsigned char **bytes, size_t *siz
 
 int image_encode(image_job *job, const char *extension, const txm_image *image, unsigned char **bytes,
                  size_t *size, const char **why) {
-    const txm_image im = txm_image_resolve(*image);
+    txm_image im = txm_image_resolve(*image), narrow;
     image_target t = {NULL, 0, 0, 0, job, why};
     const kind k = kind_of(extension);
     int ok;
@@ -292,8 +293,12 @@ int image_encode(image_job *job, const char *extension, const txm_image *image, 
     if (!image_can_write(extension, im.width, im.height, im.channels, why)) return 0;
     if (im.sample == TXM_F32)
         return *why = "no format here takes float samples; convert them to 8 or 16 bits", 0;
-    if (im.sample == TXM_U16 && !image_takes_16_bits(extension))
-        return *why = "of these formats only PNG and TIFF take 16 bits a sample; use .png", 0;
+    memset(&narrow, 0, sizeof narrow);
+    if (im.sample == TXM_U16 && !image_takes_16_bits(extension)) {
+        if (!image_copy(&im, &narrow) || !image_convert(&narrow, im.channels, TXM_U8))
+            return image_free(&narrow), *why = image_no_memory, 0;
+        im = narrow;
+    }
     switch (k) {
     case PNG: ok = png_write(&t, &im, NULL); break;
     case JPEG: ok = jpeg_write(&t, &im); break;
@@ -301,6 +306,7 @@ int image_encode(image_job *job, const char *extension, const txm_image *image, 
     case WEBP: ok = webp_write(&t, &im); break;
     default: ok = write_by_stb(&t, k, &im); break;
     }
+    image_free(&narrow);
     return hand_over(&t, ok, bytes, size);
 }
 

@@ -62,8 +62,8 @@ int image_can_write(const char *extension, int width, int height, int channels, 
 /* Does the format of this extension take samples of 16 bits? */
 int image_takes_16_bits(const char *extension);
 
-/* Encode for that extension into a block for free(). Samples are TXM_U8, where image_takes_16_bits also
-   TXM_U16. JPEG has quality 95, the others lose nothing. Of the job, which may be NULL, only env is
+/* Encode for that extension into a block for free(). Samples are TXM_U8 or TXM_U16, which is rounded to
+   8 bits where not image_takes_16_bits. JPEG has quality 95, the others lose nothing else. Of the job, which may be NULL, only env is
    used. 1 if all went well. */
 int image_encode(image_job *job, const char *extension, const txm_image *image, unsigned char **bytes,
                  size_t *size, const char **why);

@@ -90,8 +90,7 @@ static int read_head(reading *r) {
     png_set_read_fn(r->png, r, take);
     png_read_info(r->png, r->info);
     png_set_expand(r->png);
-    if (!job->deep) png_set_scale_16(r->png);
-    else if (is_little_endian()) png_set_swap(r->png);
+    if (is_little_endian()) png_set_swap(r->png);
     if (job->channels == 0 && (png_get_color_type(r->png, r->info) == PNG_COLOR_TYPE_GRAY_ALPHA ||
                                (png_get_color_type(r->png, r->info) == PNG_COLOR_TYPE_GRAY &&
                                 png_get_valid(r->png, r->info, PNG_INFO_tRNS))))
