@@ -69,7 +69,8 @@
      transparent pixels never matter; those of the result are the visible neighbours'.
      A photograph is straightened before all that: the spectra of small windows are those of a few
      waves on a plane; the tilt, the lens and the waves that explain all windows are searched for and
-     then fitted to the phases of the waves by least squares. Edges tell which way is up.
+     then fitted to the phases of the waves by least squares. What is left, if it is smooth, becomes
+     a field of displacements. Edges tell which way is up.
      A part that is synthesised again and a cell of the plane are the same kind of job, with some
      pixels given.
 
@@ -280,7 +281,7 @@ typedef struct texpatch_straight texpatch_straight;
    out    receives the result, or NULL on any error; release it with texpatch_straight_free
    return TXM_OK, also if there is no pattern; TXM_BAD_ARGUMENT, TXM_TOO_LARGE,
           TXM_OUT_OF_MEMORY, TXM_CANCELLED
-   cost   some 0.1 to 0.5 s; some 30 bytes per pixel of a picture of at most 2600 x 2600        */
+   cost   some 0.1 to 1 s; some 30 bytes per pixel of a picture of at most 2600 x 2600        */
 TEXPATCH_API txm_status texpatch_straight_find(const texpatch_straight_desc *desc, txm_env *env,
                                                texpatch_straight **out);
 
@@ -300,7 +301,7 @@ TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straigh
    map    what kind of map it is (its weight is ignored); NULL = colours. Normals turn with the
           picture, labels are never blended; colours are weighted by their alpha unless is_data
    out    of the size that was found, with the channels and samples of image
-   return TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
+   return TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_CANCELLED: then out is drawn in part    */
 TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight,
                                                const txm_image *image, const texpatch_map *map,
                                                txm_env *env, const txm_image *out);
@@ -4645,13 +4646,81 @@ static int txp_spectra_make(const txp_gray *gray, int side, txm_arena *arena, tx
     return 1;
 }
 
+/* ---- a smooth field of displacements -------------------------------------------------------- */
+
+/* What tilt and lens leave over: walls that bulge, photographs that were put together from several.
+   The displacement on the plane at a place of the photograph, as a cubic B-spline of few cells. */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_CELLS_ALONG = 7,                   /* of the spline, along the longer side of the photograph */
+    TXP_KNOTS = TXP_CELLS_ALONG + 3,       /* numbers along it                                       */
+    TXP_FIELD_MOST = TXP_KNOTS * TXP_KNOTS /* numbers of one component, at most                      */
+};
+
+typedef struct txp_swell {
+    int across, down;        /* numbers along the sides */
+    double reach_x, reach_y; /* the photograph goes from -reach to reach */
+    double cell_x, cell_y;
+    double at[TXP_FIELD_MOST][2];
+} txp_swell;
+
+/* A field of zeros over a photograph. */
+static void txp_swell_make(int width, int height, txp_swell *f) {
+    const int longer = width > height ? width : height, most = TXP_CELLS_ALONG;
+    const int cells_x = txm_clampi((int)((int64_t)most * width / longer), 1, most);
+    const int cells_y = txm_clampi((int)((int64_t)most * height / longer), 1, most);
+    memset(f, 0, sizeof *f);
+    f->across = cells_x + 3;
+    f->down = cells_y + 3;
+    f->reach_x = (double)width / longer;
+    f->reach_y = (double)height / longer;
+    f->cell_x = 2 * f->reach_x / cells_x;
+    f->cell_y = 2 * f->reach_y / cells_y;
+}
+
+/* The four weights of a cubic B-spline at t, in cells, and their slopes; returns the first number. */
+static int txp_spline_weights(double t, int numbers, double w[4], double slope[4]) {
+    const int first = txm_clampi((int)floor(t), 0, numbers - 4);
+    const double u = fmin(fmax(t - first, 0), 1), v = 1 - u;
+    w[0] = v * v * v / 6;
+    w[1] = (3 * u * u * u - 6 * u * u + 4) / 6;
+    w[2] = (3 * v * v * v - 6 * v * v + 4) / 6;
+    w[3] = u * u * u / 6;
+    slope[0] = -0.5 * v * v;
+    slope[1] = 1.5 * u * u - 2 * u;
+    slope[2] = 2 * v - 1.5 * v * v;
+    slope[3] = 0.5 * u * u;
+    return first;
+}
+
+/* The displacement at a place; m: its derivatives, as in txp_view_place. */
+static void txp_swell_at(const txp_swell *f, double x, double y, double moved[2], double m[4]) {
+    double wx[4], wy[4], sx[4], sy[4];
+    const int i0 = txp_spline_weights((x + f->reach_x) / f->cell_x, f->across, wx, sx);
+    const int j0 = txp_spline_weights((y + f->reach_y) / f->cell_y, f->down, wy, sy);
+    moved[0] = moved[1] = m[0] = m[1] = m[2] = m[3] = 0;
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < 4; i++) {
+            const double *at = f->at[(j0 + j) * f->across + i0 + i];
+            for (int d = 0; d < 2; d++) {
+                moved[d] += wx[i] * wy[j] * at[d];
+                m[2 * d] += sx[i] * wy[j] / f->cell_x * at[d];
+                m[2 * d + 1] += wx[i] * sy[j] / f->cell_y * at[d];
+            }
+        }
+    }
+}
+
 /* ---- how a plane was photographed ---------------------------------------------------------- */
 
 /* From a place (x, y) of the photograph to the plane, both centred on the middle and equal there
    to first order: the lens is undone, q = (x, y) (1 + bend r^2 + curl r^4), then the perspective,
-   (X, Y) = q / (1 + tilt_x q_x + tilt_y q_y). A periodic wall is a sum of plane waves in (X, Y). */
+   (X, Y) = q / (1 + tilt_x q_x + tilt_y q_y), then what the field adds, if there is one. A periodic
+   wall is a sum of plane waves in (X, Y). */
 typedef struct txp_view {
     double tilt_x, tilt_y, bend, curl;
+    const txp_swell *field; /* NULL: none */
 } txp_view;
 
 /* A wave on the plane: phase = a X + b Y + shift, in turns; clear: how well it is seen, in the
@@ -4677,6 +4746,12 @@ static int txp_view_place(const txp_view *v, double x, double y, double place[2]
     m[1] = xx * lxy + xy * lyy;
     m[2] = yx * lxx + yy * lxy;
     m[3] = yx * lxy + yy * lyy;
+    if (v->field) {
+        double moved[2], slopes[4];
+        txp_swell_at(v->field, x, y, moved, slopes);
+        for (int d = 0; d < 2; d++) place[d] += moved[d];
+        for (int i = 0; i < 4; i++) m[i] += slopes[i];
+    }
     return 1;
 }
 
@@ -4815,6 +4890,7 @@ static void txp_try_column(void *context, int column) {
     txp_guess *list = q->best[column];
     txp_view v;
     memset(list, 0, TXP_GUESSES * sizeof *list);
+    v.field = NULL;
     v.tilt_x = (column - TXP_TILT_STEPS) * TXP_TILT_STEP;
     for (int row = -TXP_TILT_STEPS; row <= TXP_TILT_STEPS; row++) {
         v.tilt_y = row * TXP_TILT_STEP;
@@ -5204,6 +5280,21 @@ static void txp_set_shifts(const txp_nodes *n, txp_guess *g) {
     }
 }
 
+static void txp_clearer_first(txp_guess *g) {
+    const txp_wave first = g->wave[0];
+    if (!(g->wave[1].clear > first.clear)) return;
+    g->wave[0] = g->wave[1];
+    g->wave[1] = first;
+}
+
+/* How well the waves agree with what the nodes see, and how much of the contrast they are. */
+static void txp_measure(const txp_nodes *n, txp_guess *g) {
+    for (int k = 0; k < 2; k++) {
+        g->wave[k].clear = k < n->waves ? txp_agreement(n, k) : 0;
+        g->wave[k].contrast = k < n->waves ? txp_mean_weight(n, k) : 0;
+    }
+}
+
 /* Fit the view and its waves to the phases; clear of each wave receives how well they agree, and
    the score their sum. */
 static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
@@ -5228,10 +5319,345 @@ static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
         for (int k = 0; k < TXP_NUMBERS; k++) *txp_number_of(g, k) += q.b[k];
     }
     txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
-    for (int k = 0; k < 2; k++) {
-        g->wave[k].clear = k < n->waves ? txp_agreement(n, k) : 0;
-        g->wave[k].contrast = k < n->waves ? txp_mean_weight(n, k) : 0;
+    txp_measure(n, g);
+}
+
+/* ---- fitting the field to the phases -------------------------------------------------------- */
+
+/* By how much the waves lie beside their prediction is a smooth function of the place where a wall is
+   wavy, and noise where bricks are laid unevenly. What the field predicts for nodes that it has not
+   seen tells which: blocks of nodes are left out in turn, for several stiffnesses of the field. */
+
+/* ours, see docs/choices.md */
+enum {
+    TXP_FOLD = 2,         /* nodes along the sides of the blocks that are left out in turn           */
+    TXP_STIFFNESSES = 4,  /* that are tried, each a quarter as stiff as the one before               */
+    TXP_FIELD_FITS = 6,   /* rounds of one fit, the first half with differences                      */
+    TXP_FIELD_LOOKS = 4,  /* at the photograph, with the field as it is by then                      */
+    TXP_FIELD_TERMS = 32  /* numbers of both components that matter at a place                       */
+};
+#define TXP_STIFFEST 2.56    /* weight of second differences, in turns of weight 1                */
+#define TXP_HELPS 0.7        /* of the disagreement of unseen nodes: if more is left, it is no help */
+#define TXP_SOFTER 0.85      /* the same from one stiffness to the next softer one               */
+#define TXP_FORESIGHT 0.88   /* agreement of unseen nodes, for each wave                         */
+#define TXP_HELPS_LEAST 0.02 /* a disagreement that is smaller than this is none                 */
+#define TXP_STEEPEST 0.3     /* displacement of a field from place to place                      */
+
+/* One linear form in the numbers of a field. */
+typedef struct txp_form {
+    int count, at[2 * TXP_FIELD_TERMS];
+    double value[2 * TXP_FIELD_TERMS];
+} txp_form;
+
+typedef struct txp_waving {
+    const txp_nodes *nodes;
+    const txp_guess *guess; /* its view has the field that the nodes were seen with, or none */
+    txp_swell field;        /* what is fitted                                                */
+    int parts;              /* components: 2, or 1 if only one wave is seen                  */
+    double toward[2][2];    /* the directions of the components                              */
+    double shift[2];        /* of the waves, in turns                                        */
+    int unknowns;
+    double *a, *b; /* unknowns * unknowns, unknowns */
+} txp_waving;
+
+/* Prepare a fit of the field to what the nodes see. 0: no memory. */
+static int txp_waving_make(const txp_nodes *n, const txp_guess *g, txm_arena *arena, txp_waving *q) {
+    memset(q, 0, sizeof *q);
+    q->nodes = n;
+    q->guess = g;
+    txp_swell_make(n->gray->width, n->gray->height, &q->field);
+    q->parts = n->waves;
+    q->toward[0][0] = q->toward[1][1] = 1;
+    if (q->parts == 1) {
+        const txp_wave *w = &g->wave[0];
+        const double length = sqrt(w->a * w->a + w->b * w->b);
+        if (!(length > 0)) return 1;
+        q->toward[0][0] = w->a / length;
+        q->toward[0][1] = w->b / length;
     }
+    q->unknowns = q->parts * q->field.across * q->field.down;
+    const size_t count = (size_t)q->unknowns;
+    q->a = (double *)txm_arena_alloc(arena, count * count, sizeof *q->a);
+    q->b = (double *)txm_arena_alloc(arena, count, sizeof *q->b);
+    return !arena->failed;
+}
+
+/* Add how the phase of a wave at a place depends on the field. */
+static void txp_form_phase(const txp_waving *q, const txp_wave *w, txp_spot at, double sign,
+                           txp_form *form) {
+    const txp_swell *f = &q->field;
+    double wx[4], wy[4], slope[4];
+    const int i0 = txp_spline_weights((at.x + f->reach_x) / f->cell_x, f->across, wx, slope);
+    const int j0 = txp_spline_weights((at.y + f->reach_y) / f->cell_y, f->down, wy, slope);
+    for (int j = 0; j < 4; j++) {
+        for (int i = 0; i < 4; i++) {
+            for (int p = 0; p < q->parts; p++) {
+                const double along = w->a * q->toward[p][0] + w->b * q->toward[p][1];
+                form->at[form->count] = ((j0 + j) * f->across + i0 + i) * q->parts + p;
+                form->value[form->count++] = sign * wx[i] * wy[j] * along;
+            }
+        }
+    }
+}
+
+/* The equation form = value. */
+static void txp_form_add(txp_waving *q, const txp_form *form, double value, double weight) {
+    for (int i = 0; i < form->count; i++) {
+        const double wi = weight * form->value[i];
+        double *row = q->a + (size_t)form->at[i] * (size_t)q->unknowns;
+        q->b[form->at[i]] += wi * value;
+        for (int j = 0; j < form->count; j++)
+            if (form->at[j] <= form->at[i]) row[form->at[j]] += wi * form->value[j];
+    }
+}
+
+/* Second differences of the numbers of a field are small. */
+static void txp_stiffen(txp_waving *q, double weight) {
+    static const int steps[3][3][2] = {
+        {{0, 0}, {1, 0}, {2, 0}}, {{0, 0}, {0, 1}, {0, 2}}, {{0, 0}, {1, 1}, {0, 0}}};
+    const txp_swell *f = &q->field;
+    for (int y = 0; y < f->down; y++) {
+        for (int x = 0; x < f->across; x++) {
+            for (int k = 0; k < 3 * q->parts; k++) {
+                const int kind = k / q->parts, part = k % q->parts;
+                const int(*s)[2] = steps[kind];
+                const int wide = kind == 0 ? 2 : kind == 2, high = kind == 1 ? 2 : kind == 2;
+                txp_form form;
+                if (x + wide >= f->across || y + high >= f->down) continue;
+                form.count = kind == 2 ? 4 : 3;
+                for (int i = 0; i < 3; i++) {
+                    form.at[i] = ((y + s[i][1]) * f->across + x + s[i][0]) * q->parts + part;
+                    form.value[i] = i == 1 ? -2 : 1;
+                }
+                if (kind == 2) {
+                    form.at[2] = (y * f->across + x + 1) * q->parts + part;
+                    form.at[3] = ((y + 1) * f->across + x) * q->parts + part;
+                    form.value[0] = form.value[1] = 1;
+                    form.value[2] = form.value[3] = -1;
+                }
+                txp_form_add(q, &form, 0, kind == 2 ? 2 * weight : weight);
+            }
+        }
+    }
+    for (int i = 0; i < q->unknowns; i++)
+        q->a[(size_t)i * (size_t)q->unknowns + (size_t)i] += 1e-3 * weight + 1e-9;
+}
+
+/* Solve: a is overwritten, b becomes the solution. */
+static void txp_waving_solve(txp_waving *q) {
+    const int n = q->unknowns;
+    double *b = q->b;
+    for (int i = 0; i < n; i++) {
+        double *row = q->a + (size_t)i * (size_t)n;
+        for (int j = 0; j <= i; j++) {
+            const double *other = q->a + (size_t)j * (size_t)n;
+            double sum = row[j];
+            for (int k = 0; k < j; k++) sum -= row[k] * other[k];
+            row[j] = i == j ? sqrt(fmax(sum, 1e-12)) : sum / other[j];
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        const double *row = q->a + (size_t)i * (size_t)n;
+        for (int k = 0; k < i; k++) b[i] -= row[k] * b[k];
+        b[i] /= row[i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        for (int k = i + 1; k < n; k++) b[i] -= q->a[(size_t)k * (size_t)n + (size_t)i] * b[k];
+        b[i] /= q->a[(size_t)i * (size_t)n + (size_t)i];
+    }
+}
+
+/* By how many turns the fitted field moves a wave at a place. */
+static double txp_moves(const txp_waving *q, const txp_wave *w, txp_spot at) {
+    double moved[2], m[4];
+    txp_swell_at(&q->field, at.x, at.y, moved, m);
+    return w->a * moved[0] + w->b * moved[1];
+}
+
+/* By how much a wave at a node lies beside tilt, lens and wave; the fitted field is left out, or in. */
+static double txp_still_beside(const txp_waving *q, int node, int k, int with_field) {
+    const txp_wave *w = &q->guess->wave[k];
+    const txp_spot at = q->nodes->at[node];
+    double moved[2], m[4], beside = q->nodes->sight[node][k].beside - q->shift[k];
+    if (q->guess->view.field) {
+        txp_swell_at(q->guess->view.field, at.x, at.y, moved, m);
+        beside += w->a * moved[0] + w->b * moved[1];
+    }
+    return with_field ? beside - txp_moves(q, w, at) : beside;
+}
+
+/* In which of the two parts of the nodes a node is. */
+static int txp_fold_of(const txp_nodes *n, int node) {
+    return (node % n->across / (int)TXP_FOLD + node / n->across / (int)TXP_FOLD) & 1;
+}
+
+/* Equations of the nodes, or of pairs of neighbours; those of one part left out (-1: none). */
+static void txp_waving_collect(txp_waving *q, int left_out, int differences) {
+    const txp_nodes *n = q->nodes;
+    const size_t count = (size_t)q->unknowns;
+    memset(q->a, 0, count * count * sizeof *q->a);
+    memset(q->b, 0, count * sizeof *q->b);
+    for (int i = 0; i < n->across * n->down; i++) {
+        for (int k = 0; k < n->waves && txp_fold_of(n, i) != left_out; k++) {
+            const txp_wave *w = &q->guess->wave[k];
+            const txp_sight *s = &n->sight[i][k];
+            txp_form form;
+            if (!(s->weight > 0)) continue;
+            for (int d = 0; d < 2 && differences; d++) {
+                const int j = d ? i + n->across : i + 1;
+                if (d ? j >= n->across * n->down : j % n->across == 0) continue;
+                const txp_sight *t = &n->sight[j][k];
+                if (!(t->weight > 0) || txp_fold_of(n, j) == left_out) continue;
+                form.count = 0;
+                txp_form_phase(q, w, n->at[j], 1, &form);
+                txp_form_phase(q, w, n->at[i], -1, &form);
+                const double rest =
+                    txp_rest(txp_still_beside(q, j, k, 1) - txp_still_beside(q, i, k, 1));
+                const double r = rest / (2 * TXP_OUTLIER);
+                txp_form_add(q, &form,
+                             rest + txp_moves(q, w, n->at[j]) - txp_moves(q, w, n->at[i]),
+                             s->weight * t->weight / (1 + r * r));
+            }
+            if (differences) continue;
+            form.count = 0;
+            txp_form_phase(q, w, n->at[i], 1, &form);
+            const double rest = txp_rest(txp_still_beside(q, i, k, 1)), r = rest / TXP_OUTLIER;
+            txp_form_add(q, &form, rest + txp_moves(q, w, n->at[i]),
+                         s->weight * s->weight / (1 + r * r));
+        }
+    }
+}
+
+/* By how much each wave agrees, at the nodes of one part (-1: all), with what is fitted: sums of what
+   agrees and of what there is are added. */
+static void txp_waving_agree(const txp_waving *q, int part, int with_field, double sums[2][2]) {
+    const txp_nodes *n = q->nodes;
+    double sine, cosine;
+    for (int i = 0; i < n->across * n->down; i++) {
+        for (int k = 0; k < n->waves; k++) {
+            if (part >= 0 && txp_fold_of(n, i) != part) continue;
+            txm_sincos(2 * TXM_PI * txp_still_beside(q, i, k, with_field), &sine, &cosine);
+            sums[k][0] += n->sight[i][k].weight * cosine;
+            sums[k][1] += n->sight[i][k].weight;
+        }
+    }
+}
+
+/* The agreement of the wave that agrees least. */
+static double txp_least_agreement(const txp_waving *q, double sums[2][2]) {
+    double least = 1;
+    for (int k = 0; k < q->nodes->waves; k++)
+        least = fmin(least, sums[k][1] > 0 ? sums[k][0] / sums[k][1] : 0);
+    return least;
+}
+
+/* Turn each wave so that what is left has the mean 0. */
+static void txp_waving_turn(txp_waving *q, int left_out) {
+    const txp_nodes *n = q->nodes;
+    for (int k = 0; k < n->waves; k++) {
+        double re = 0, im = 0, sine, cosine;
+        for (int i = 0; i < n->across * n->down; i++) {
+            if (txp_fold_of(n, i) == left_out) continue;
+            txm_sincos(2 * TXM_PI * txp_still_beside(q, i, k, 1), &sine, &cosine);
+            re += n->sight[i][k].weight * cosine;
+            im += n->sight[i][k].weight * sine;
+        }
+        q->shift[k] += txp_turns(re, im);
+    }
+}
+
+/* Fit the field; the nodes of one part are left out (-1: none). */
+static void txp_waving_fit(txp_waving *q, double stiffness, int left_out) {
+    memset(q->field.at, 0, sizeof q->field.at);
+    q->shift[0] = q->shift[1] = 0;
+    for (int round = 0; round < TXP_FIELD_FITS; round++) {
+        txp_waving_collect(q, left_out, round < TXP_FIELD_FITS / 2);
+        txp_stiffen(q, stiffness);
+        txp_waving_solve(q);
+        for (int i = 0; i < q->unknowns; i++) {
+            double *at = q->field.at[i / q->parts];
+            const double *toward = q->toward[i % q->parts];
+            if (i % q->parts == 0) at[0] = at[1] = 0;
+            for (int d = 0; d < 2; d++) at[d] += q->b[i] * toward[d];
+        }
+        txp_waving_turn(q, left_out);
+    }
+}
+
+/* How well the parts agree that were left out in turn. */
+static double txp_foresight(txp_waving *q, double stiffness) {
+    double sums[2][2] = {{0, 0}, {0, 0}};
+    for (int part = 0; part < 2; part++) {
+        txp_waving_fit(q, stiffness, part);
+        txp_waving_agree(q, part, 1, sums);
+    }
+    return txp_least_agreement(q, sums);
+}
+
+/* Is the field gentle all over the photograph? */
+static int txp_is_gentle(const txp_swell *f) {
+    enum { STEPS = 24 };
+    for (int i = 0; i <= STEPS; i++) {
+        for (int j = 0; j <= STEPS; j++) {
+            double moved[2], m[4];
+            txp_swell_at(f, (2.0 * i / (int)STEPS - 1) * f->reach_x,
+                         (2.0 * j / (int)STEPS - 1) * f->reach_y, moved, m);
+            for (int k = 0; k < 4; k++)
+                if (!(fabs(m[k]) < TXP_STEEPEST)) return 0;
+        }
+    }
+    return 1;
+}
+
+/* The stiffness with which a field predicts unseen nodes clearly better than none does, the stiffest
+   unless a softer one is clearly better; 0: none. */
+static double txp_best_stiffness(txp_waving *q) {
+    double sums[2][2] = {{0, 0}, {0, 0}}, best = 0, stiffness = 0, tried = TXP_STIFFEST;
+    txp_waving_agree(q, -1, 0, sums);
+    const double before = txp_least_agreement(q, sums);
+    if (1 - before < TXP_HELPS_LEAST) return 0;
+    for (int i = 0; i < TXP_STIFFNESSES; i++, tried /= 4) {
+        const double agreement = txp_foresight(q, tried);
+        if (!(1 - agreement < TXP_SOFTER * (1 - best))) continue;
+        best = agreement;
+        stiffness = tried;
+    }
+    return best > TXP_FORESIGHT && 1 - best < TXP_HELPS * (1 - before) ? stiffness : 0;
+}
+
+/* Look for a field that helps; the guess was fitted without one. Then *field is it, the guess's view
+   points to it and its waves are turned; if the second wave does not agree it is left out. *helps: is
+   there one? 0: no memory. */
+static int txp_find_field(txp_nodes *n, txm_env *env, txp_guess *g, txp_swell *field, int *helps) {
+    txm_arena scratch;
+    txp_waving q;
+    txp_seeing seeing;
+    double stiffness = 0;
+    *helps = 0;
+    seeing.nodes = n;
+    seeing.guess = g;
+    txp_clearer_first(g);
+    txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
+    txm_arena_init(&scratch, env);
+    for (; n->waves > 0; n->waves--) {
+        if (!txp_waving_make(n, g, &scratch, &q)) {
+            txm_arena_free(&scratch);
+            return 0;
+        }
+        if (q.unknowns) stiffness = txp_best_stiffness(&q);
+        if (stiffness > 0 || n->waves == 1) break;
+    }
+    for (int look = 0; look < TXP_FIELD_LOOKS && stiffness > 0; look++) {
+        txp_waving_fit(&q, stiffness, -1);
+        *field = q.field;
+        g->view.field = field;
+        for (int k = 0; k < n->waves; k++)
+            g->wave[k].shift = txp_rest(g->wave[k].shift + q.shift[k]);
+        txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
+    }
+    *helps = stiffness > 0 && txp_is_gentle(field);
+    txm_arena_free(&scratch);
+    return 1;
 }
 
 /* ---- finding the pattern of a photograph --------------------------------------------------- */
@@ -5242,13 +5668,15 @@ static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
 #define TXP_CONTRAST 0.03    /* of a wave, 0..1, that counts half                                 */
 #define TXP_CONVINCING 1.3   /* score from which on nothing else is tried                         */
 #define TXP_LEAST_PERIODS 1.5 /* of a wave in half of the longer side                             */
+#define TXP_FIELD_FROM 0.4   /* agreement from which on a field is looked for                    */
 #define TXP_BEND_MOST 0.5    /* of a lens, |bend| and |curl|                                      */
 #define TXP_FREQUENCY 0.2    /* cycles per pixel, at most, in the picture the phases are read from */
 
 /* What is found: score 0: no pattern. */
 typedef struct txp_sighting {
     txp_guess guess;
-    int size; /* the picture the phases are read from */
+    int size;        /* the picture the phases are read from      */
+    txp_swell field; /* that of the guess, if its view points to it */
 } txp_sighting;
 
 /* The smallest picture that shows all waves of a guess well. */
@@ -5272,11 +5700,7 @@ static double txp_worth(const txp_nodes *n, txp_guess *g) {
     const double reach_x = 0.5 * n->gray->width / n->half, reach_y = 0.5 * n->gray->height / n->half;
     if (fabs(v->bend) > TXP_BEND_MOST || fabs(v->curl) > TXP_BEND_MOST) return 0;
     if (!(fabs(v->tilt_x) * reach_x + fabs(v->tilt_y) * reach_y < 0.95)) return 0;
-    if (g->wave[1].clear > g->wave[0].clear) {
-        const txp_wave first = g->wave[0];
-        g->wave[0] = g->wave[1];
-        g->wave[1] = first;
-    }
+    txp_clearer_first(g);
     const txp_wave *a = &g->wave[0], *b = &g->wave[1];
     const double cross = a->a * b->b - a->b * b->a;
     const double aa = a->a * a->a + a->b * a->b, bb = b->a * b->a + b->b * b->b;
@@ -5291,6 +5715,22 @@ static double txp_worth(const txp_nodes *n, txp_guess *g) {
     return sum;
 }
 
+/* Fit a guess, with a field where that helps, and judge it. 0: no memory. */
+static int txp_fit_guess(txp_nodes *n, txm_env *env, txp_guess *g, txp_swell *field) {
+    txp_guess wavy;
+    int helps = 0;
+    txp_fit_phases(n, env, g);
+    wavy = *g;
+    g->score = txp_worth(n, g);
+    if (!(fmax(wavy.wave[0].clear, wavy.wave[1].clear) >= TXP_FIELD_FROM)) return 1;
+    if (!txp_find_field(n, env, &wavy, field, &helps)) return 0;
+    if (!helps) return 1;
+    txp_measure(n, &wavy);
+    wavy.score = txp_worth(n, &wavy);
+    if (wavy.score > g->score) *g = wavy;
+    return 1;
+}
+
 /* Try the guesses of one scale. 0: no memory. */
 static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm_env *env,
                          txp_sighting *best) {
@@ -5302,23 +5742,25 @@ static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm
     if (done) txp_search_view(&spectra, env, offers);
     for (int k = 0; k < TXP_OFFERS && done; k++) {
         txp_nodes nodes;
+        txp_swell field;
         txp_guess g = offers[k];
         if (!(g.score > 0) || best->guess.score >= TXP_CONVINCING) break;
         const int size = txp_size_for(sizes, count, &g);
-        done = txp_nodes_make(&sizes[size], &scratch, &nodes);
+        done = txp_nodes_make(&sizes[size], &scratch, &nodes) &&
+               txp_fit_guess(&nodes, env, &g, &field);
         if (!done) break;
-        txp_fit_phases(&nodes, env, &g);
-        g.score = txp_worth(&nodes, &g);
         if (g.score > best->guess.score) {
             best->guess = g;
             best->size = size;
+            if (g.view.field) best->field = field;
         }
     }
     txm_arena_free(&scratch);
     return done;
 }
 
-/* The view and the waves of a photograph; sizes: its evened pictures. */
+/* The view and the waves of a photograph; sizes: its evened pictures. The view's field is that of
+   *found. */
 static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *env,
                                    txp_sighting *found) {
     memset(found, 0, sizeof *found);
@@ -5328,13 +5770,14 @@ static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *en
         for (int side = TXP_WINDOW_SIDE; side >= TXP_WINDOW_SIDE / 4; side /= 2) {
             /* small windows only where large ones would be too few */
             if (least < side || (side < TXP_WINDOW_SIDE && least > 4 * side)) continue;
-            if (found->guess.score >= TXP_CONVINCING) return TXM_OK;
+            if (found->guess.score >= TXP_CONVINCING) break;
             if (txm_progress(env, 0.5f * (float)(count - at) / (float)(count + 1), "lattice"))
                 return txm_fail(env, TXM_CANCELLED, "cancelled");
             if (!txp_try_scale(sizes, count, at, side, env, found))
                 return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
         }
     }
+    if (found->guess.view.field) found->guess.view.field = &found->field;
     return TXM_OK;
 }
 
@@ -5352,6 +5795,7 @@ enum {
     TXP_SNAP = 2,         /* an edge is along a wave within so many                              */
     TXP_SQUARE_LEAST = 2, /* the second axis is within so many of the normal of the first ...    */
     TXP_SQUARE_MOST = 40, /* ... or, in a tilted view, so many                                   */
+    TXP_FIELD_ROUNDS = 6, /* of the search for the place that a field moves                       */
     TXP_CELLS = 72,       /* cells along the sides of the plane when the frame is chosen         */
     TXP_EDGES_FROM = 300  /* pixels: longer side of the picture whose edges are looked at        */
 };
@@ -5550,15 +5994,9 @@ static double txp_undo_lens(const txp_view *v, double r) {
     return p;
 }
 
-/* The place of the photograph, in half sides from its middle, at (x, y) of the frame; m: its
-   derivatives by x and y. 0: there is none. */
-static int txp_frame_place(const txp_frame *f, double x, double y, double *px, double *py,
-                           double m[4]) {
-    const txp_view *v = &f->view;
-    const double det = f->xx * f->yy - f->xy * f->yx;
-    const double ux = (f->yy * x - f->xy * y) / det, uy = (f->xx * y - f->yx * x) / det;
+/* The place of the photograph at (ux, uy) of the plane, by tilt and lens alone. 0: there is none. */
+static int txp_seen_at(const txp_view *v, double ux, double uy, double *px, double *py) {
     const double depth = 1 - v->tilt_x * ux - v->tilt_y * uy;
-    double place[2], k[4];
     if (!(depth > 0.05)) return 0;
     const double qx = ux / depth, qy = uy / depth, r = sqrt(qx * qx + qy * qy);
     if (r > 3) return 0;
@@ -5566,6 +6004,23 @@ static int txp_frame_place(const txp_frame *f, double x, double y, double *px, d
     if (!(p >= 0) || !(p < 3)) return 0;
     *px = r > 0 ? qx * p / r : 0;
     *py = r > 0 ? qy * p / r : 0;
+    return 1;
+}
+
+/* The place of the photograph, in half sides from its middle, at (x, y) of the frame; m: its
+   derivatives by x and y. 0: there is none. */
+static int txp_frame_place(const txp_frame *f, double x, double y, double *px, double *py,
+                           double m[4]) {
+    const txp_view *v = &f->view;
+    const double det = f->xx * f->yy - f->xy * f->yx;
+    const double ux = (f->yy * x - f->xy * y) / det, uy = (f->xx * y - f->yx * x) / det;
+    double place[2], k[4];
+    if (!txp_seen_at(v, ux, uy, px, py)) return 0;
+    /* a field changes slowly: from here its displacement is nearly the one that is meant */
+    for (int i = 0; i < TXP_FIELD_ROUNDS && v->field; i++) {
+        txp_swell_at(v->field, *px, *py, place, k);
+        if (!txp_seen_at(v, ux - place[0], uy - place[1], px, py)) return 0;
+    }
     if (!txp_view_place(v, *px, *py, place, k)) return 0;
     /* frame by photograph, inverted */
     const double a = f->xx * k[0] + f->xy * k[2], b = f->xx * k[1] + f->xy * k[3];
@@ -5689,11 +6144,13 @@ struct texpatch_straight {
     int found;
     int photo_width, photo_height;
     txp_frame frame;
+    txp_swell field; /* that of the frame's view, if it points to it */
     double clear;
 };
 
 /* ours, see docs/choices.md */
 enum {
+    TXP_ROWS = 32,       /* of the result, drawn between two reports of progress                 */
     TXP_STRIDE = 16,     /* pixels of a row from one exact position to the next; linear between  */
     TXP_MOST_SAMPLES = 4 /* across and down, of one pixel, where the picture shrinks             */
 };
@@ -5714,6 +6171,7 @@ typedef struct txp_rectifying {
     const txp_frame *frame;
     const txm_image *image, *out;
     texpatch_map kind;
+    int first; /* row */
 } txp_rectifying;
 
 /* Sample c of a pixel, in the unit of its type. */
@@ -5786,9 +6244,10 @@ static void txp_rectify_pixel(const txp_rectifying *q, double px, double py, con
     if (q->kind.is_normal) txp_rectify_normal(q, m, v);
 }
 
-static void txp_rectify_row(void *context, int y) {
+static void txp_rectify_row(void *context, int row) {
     const txp_rectifying *q = (const txp_rectifying *)context;
     const txm_image *out = q->out;
+    const int y = q->first + row;
     double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1};
     int samples = 1;
     for (int x = 0; x < out->width; x++) {
@@ -5805,6 +6264,19 @@ static void txp_rectify_row(void *context, int y) {
         txp_rectify_pixel(q, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, m, samples, v);
         for (int c = 0; c < out->channels; c++) txm_image_set(out, x, y, c, v[c]);
     }
+}
+
+/* All rows, some at a time. */
+static txm_status txp_rectify_rows(const txp_rectifying *all, txm_env *env) {
+    txp_rectifying some = *all;
+    const int height = all->out->height;
+    for (int y = 0; y < height; y += TXP_ROWS) {
+        if (txm_progress(env, (float)y / (float)height, "drawing"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        some.first = y;
+        txm_parallel_for(env, height - y < TXP_ROWS ? height - y : TXP_ROWS, txp_rectify_row, &some);
+    }
+    return TXM_OK;
 }
 
 /* ---- the calls ------------------------------------------------------------------------------ */
@@ -5839,6 +6311,8 @@ static txm_status txp_straight_search(const texpatch_straight_desc *d, txm_arena
                                   : sizes[at + 1].height) >= TXP_EDGES_FROM)
         at++;
     s->frame.view = found.guess.view;
+    s->field = found.field;
+    if (s->frame.view.field) s->frame.view.field = &s->field;
     s->clear = found.guess.wave[0].clear;
     double stretch[4], axes[2];
     txp_gray blurred;
@@ -5925,11 +6399,11 @@ TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight
     q.frame = &straight->frame;
     q.image = &from;
     q.out = &to;
+    q.first = 0;
     const size_t row = (size_t)to.width * (size_t)to.channels * txm_sample_bytes(to.sample);
     for (int y = 0; y < to.height && !straight->found; y++)
         memcpy(txm_image_row(&to, y), txm_image_row_const(&from, y), row);
-    if (straight->found) txm_parallel_for(env, to.height, txp_rectify_row, &q);
-    return TXM_OK;
+    return straight->found ? txp_rectify_rows(&q, env) : TXM_OK;
 }
 
 TEXPATCH_API void texpatch_straight_free(texpatch_straight *straight) {

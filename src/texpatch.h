@@ -69,7 +69,8 @@
      transparent pixels never matter; those of the result are the visible neighbours'.
      A photograph is straightened before all that: the spectra of small windows are those of a few
      waves on a plane; the tilt, the lens and the waves that explain all windows are searched for and
-     then fitted to the phases of the waves by least squares. Edges tell which way is up.
+     then fitted to the phases of the waves by least squares. What is left, if it is smooth, becomes
+     a field of displacements. Edges tell which way is up.
      A part that is synthesised again and a cell of the plane are the same kind of job, with some
      pixels given.
 
@@ -280,7 +281,7 @@ typedef struct texpatch_straight texpatch_straight;
    out    receives the result, or NULL on any error; release it with texpatch_straight_free
    return TXM_OK, also if there is no pattern; TXM_BAD_ARGUMENT, TXM_TOO_LARGE,
           TXM_OUT_OF_MEMORY, TXM_CANCELLED
-   cost   some 0.1 to 0.5 s; some 30 bytes per pixel of a picture of at most 2600 x 2600        */
+   cost   some 0.1 to 1 s; some 30 bytes per pixel of a picture of at most 2600 x 2600        */
 TEXPATCH_API txm_status texpatch_straight_find(const texpatch_straight_desc *desc, txm_env *env,
                                                texpatch_straight **out);
 
@@ -300,7 +301,7 @@ TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straigh
    map    what kind of map it is (its weight is ignored); NULL = colours. Normals turn with the
           picture, labels are never blended; colours are weighted by their alpha unless is_data
    out    of the size that was found, with the channels and samples of image
-   return TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE                                             */
+   return TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_CANCELLED: then out is drawn in part    */
 TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight,
                                                const txm_image *image, const texpatch_map *map,
                                                txm_env *env, const txm_image *out);
@@ -380,8 +381,10 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 #include "texpatch/levels.h"
 #include "texpatch/evened.h"
 #include "texpatch/spectra.h"
+#include "texpatch/field.h"
 #include "texpatch/view.h"
 #include "texpatch/phase.h"
+#include "texpatch/wavy.h"
 #include "texpatch/sighting.h"
 #include "texpatch/frame.h"
 #include "texpatch/rectify.h"

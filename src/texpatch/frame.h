@@ -17,6 +17,7 @@ enum {
     TXP_SNAP = 2,         /* an edge is along a wave within so many                              */
     TXP_SQUARE_LEAST = 2, /* the second axis is within so many of the normal of the first ...    */
     TXP_SQUARE_MOST = 40, /* ... or, in a tilted view, so many                                   */
+    TXP_FIELD_ROUNDS = 6, /* of the search for the place that a field moves                       */
     TXP_CELLS = 72,       /* cells along the sides of the plane when the frame is chosen         */
     TXP_EDGES_FROM = 300  /* pixels: longer side of the picture whose edges are looked at        */
 };
@@ -215,15 +216,9 @@ static double txp_undo_lens(const txp_view *v, double r) {
     return p;
 }
 
-/* The place of the photograph, in half sides from its middle, at (x, y) of the frame; m: its
-   derivatives by x and y. 0: there is none. */
-static int txp_frame_place(const txp_frame *f, double x, double y, double *px, double *py,
-                           double m[4]) {
-    const txp_view *v = &f->view;
-    const double det = f->xx * f->yy - f->xy * f->yx;
-    const double ux = (f->yy * x - f->xy * y) / det, uy = (f->xx * y - f->yx * x) / det;
+/* The place of the photograph at (ux, uy) of the plane, by tilt and lens alone. 0: there is none. */
+static int txp_seen_at(const txp_view *v, double ux, double uy, double *px, double *py) {
     const double depth = 1 - v->tilt_x * ux - v->tilt_y * uy;
-    double place[2], k[4];
     if (!(depth > 0.05)) return 0;
     const double qx = ux / depth, qy = uy / depth, r = sqrt(qx * qx + qy * qy);
     if (r > 3) return 0;
@@ -231,6 +226,23 @@ static int txp_frame_place(const txp_frame *f, double x, double y, double *px, d
     if (!(p >= 0) || !(p < 3)) return 0;
     *px = r > 0 ? qx * p / r : 0;
     *py = r > 0 ? qy * p / r : 0;
+    return 1;
+}
+
+/* The place of the photograph, in half sides from its middle, at (x, y) of the frame; m: its
+   derivatives by x and y. 0: there is none. */
+static int txp_frame_place(const txp_frame *f, double x, double y, double *px, double *py,
+                           double m[4]) {
+    const txp_view *v = &f->view;
+    const double det = f->xx * f->yy - f->xy * f->yx;
+    const double ux = (f->yy * x - f->xy * y) / det, uy = (f->xx * y - f->yx * x) / det;
+    double place[2], k[4];
+    if (!txp_seen_at(v, ux, uy, px, py)) return 0;
+    /* a field changes slowly: from here its displacement is nearly the one that is meant */
+    for (int i = 0; i < TXP_FIELD_ROUNDS && v->field; i++) {
+        txp_swell_at(v->field, *px, *py, place, k);
+        if (!txp_seen_at(v, ux - place[0], uy - place[1], px, py)) return 0;
+    }
     if (!txp_view_place(v, *px, *py, place, k)) return 0;
     /* frame by photograph, inverted */
     const double a = f->xx * k[0] + f->xy * k[2], b = f->xx * k[1] + f->xy * k[3];

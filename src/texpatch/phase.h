@@ -275,6 +275,21 @@ static void txp_set_shifts(const txp_nodes *n, txp_guess *g) {
     }
 }
 
+static void txp_clearer_first(txp_guess *g) {
+    const txp_wave first = g->wave[0];
+    if (!(g->wave[1].clear > first.clear)) return;
+    g->wave[0] = g->wave[1];
+    g->wave[1] = first;
+}
+
+/* How well the waves agree with what the nodes see, and how much of the contrast they are. */
+static void txp_measure(const txp_nodes *n, txp_guess *g) {
+    for (int k = 0; k < 2; k++) {
+        g->wave[k].clear = k < n->waves ? txp_agreement(n, k) : 0;
+        g->wave[k].contrast = k < n->waves ? txp_mean_weight(n, k) : 0;
+    }
+}
+
 /* Fit the view and its waves to the phases; clear of each wave receives how well they agree, and
    the score their sum. */
 static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
@@ -299,10 +314,7 @@ static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
         for (int k = 0; k < TXP_NUMBERS; k++) *txp_number_of(g, k) += q.b[k];
     }
     txm_parallel_for(env, n->across * n->down, txp_see_node, &seeing);
-    for (int k = 0; k < 2; k++) {
-        g->wave[k].clear = k < n->waves ? txp_agreement(n, k) : 0;
-        g->wave[k].contrast = k < n->waves ? txp_mean_weight(n, k) : 0;
-    }
+    txp_measure(n, g);
 }
 
 #endif /* TEXPATCH_PHASE_H */

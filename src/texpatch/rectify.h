@@ -11,11 +11,13 @@ struct texpatch_straight {
     int found;
     int photo_width, photo_height;
     txp_frame frame;
+    txp_swell field; /* that of the frame's view, if it points to it */
     double clear;
 };
 
 /* ours, see docs/choices.md */
 enum {
+    TXP_ROWS = 32,       /* of the result, drawn between two reports of progress                 */
     TXP_STRIDE = 16,     /* pixels of a row from one exact position to the next; linear between  */
     TXP_MOST_SAMPLES = 4 /* across and down, of one pixel, where the picture shrinks             */
 };
@@ -36,6 +38,7 @@ typedef struct txp_rectifying {
     const txp_frame *frame;
     const txm_image *image, *out;
     texpatch_map kind;
+    int first; /* row */
 } txp_rectifying;
 
 /* Sample c of a pixel, in the unit of its type. */
@@ -108,9 +111,10 @@ static void txp_rectify_pixel(const txp_rectifying *q, double px, double py, con
     if (q->kind.is_normal) txp_rectify_normal(q, m, v);
 }
 
-static void txp_rectify_row(void *context, int y) {
+static void txp_rectify_row(void *context, int row) {
     const txp_rectifying *q = (const txp_rectifying *)context;
     const txm_image *out = q->out;
+    const int y = q->first + row;
     double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1};
     int samples = 1;
     for (int x = 0; x < out->width; x++) {
@@ -127,6 +131,19 @@ static void txp_rectify_row(void *context, int y) {
         txp_rectify_pixel(q, x0 + (x1 - x0) * t, y0 + (y1 - y0) * t, m, samples, v);
         for (int c = 0; c < out->channels; c++) txm_image_set(out, x, y, c, v[c]);
     }
+}
+
+/* All rows, some at a time. */
+static txm_status txp_rectify_rows(const txp_rectifying *all, txm_env *env) {
+    txp_rectifying some = *all;
+    const int height = all->out->height;
+    for (int y = 0; y < height; y += TXP_ROWS) {
+        if (txm_progress(env, (float)y / (float)height, "drawing"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        some.first = y;
+        txm_parallel_for(env, height - y < TXP_ROWS ? height - y : TXP_ROWS, txp_rectify_row, &some);
+    }
+    return TXM_OK;
 }
 
 /* ---- the calls ------------------------------------------------------------------------------ */
@@ -161,6 +178,8 @@ static txm_status txp_straight_search(const texpatch_straight_desc *d, txm_arena
                                   : sizes[at + 1].height) >= TXP_EDGES_FROM)
         at++;
     s->frame.view = found.guess.view;
+    s->field = found.field;
+    if (s->frame.view.field) s->frame.view.field = &s->field;
     s->clear = found.guess.wave[0].clear;
     double stretch[4], axes[2];
     txp_gray blurred;
@@ -247,11 +266,11 @@ TEXPATCH_API txm_status texpatch_straight_draw(const texpatch_straight *straight
     q.frame = &straight->frame;
     q.image = &from;
     q.out = &to;
+    q.first = 0;
     const size_t row = (size_t)to.width * (size_t)to.channels * txm_sample_bytes(to.sample);
     for (int y = 0; y < to.height && !straight->found; y++)
         memcpy(txm_image_row(&to, y), txm_image_row_const(&from, y), row);
-    if (straight->found) txm_parallel_for(env, to.height, txp_rectify_row, &q);
-    return TXM_OK;
+    return straight->found ? txp_rectify_rows(&q, env) : TXM_OK;
 }
 
 TEXPATCH_API void texpatch_straight_free(texpatch_straight *straight) {

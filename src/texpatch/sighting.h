@@ -1,7 +1,7 @@
 #ifndef TEXPATCH_SIGHTING_H
 #define TEXPATCH_SIGHTING_H
 
-#include "phase.h"
+#include "wavy.h"
 
 /* ---- finding the pattern of a photograph --------------------------------------------------- */
 
@@ -11,13 +11,15 @@
 #define TXP_CONTRAST 0.03    /* of a wave, 0..1, that counts half                                 */
 #define TXP_CONVINCING 1.3   /* score from which on nothing else is tried                         */
 #define TXP_LEAST_PERIODS 1.5 /* of a wave in half of the longer side                             */
+#define TXP_FIELD_FROM 0.4   /* agreement from which on a field is looked for                    */
 #define TXP_BEND_MOST 0.5    /* of a lens, |bend| and |curl|                                      */
 #define TXP_FREQUENCY 0.2    /* cycles per pixel, at most, in the picture the phases are read from */
 
 /* What is found: score 0: no pattern. */
 typedef struct txp_sighting {
     txp_guess guess;
-    int size; /* the picture the phases are read from */
+    int size;        /* the picture the phases are read from      */
+    txp_swell field; /* that of the guess, if its view points to it */
 } txp_sighting;
 
 /* The smallest picture that shows all waves of a guess well. */
@@ -41,11 +43,7 @@ static double txp_worth(const txp_nodes *n, txp_guess *g) {
     const double reach_x = 0.5 * n->gray->width / n->half, reach_y = 0.5 * n->gray->height / n->half;
     if (fabs(v->bend) > TXP_BEND_MOST || fabs(v->curl) > TXP_BEND_MOST) return 0;
     if (!(fabs(v->tilt_x) * reach_x + fabs(v->tilt_y) * reach_y < 0.95)) return 0;
-    if (g->wave[1].clear > g->wave[0].clear) {
-        const txp_wave first = g->wave[0];
-        g->wave[0] = g->wave[1];
-        g->wave[1] = first;
-    }
+    txp_clearer_first(g);
     const txp_wave *a = &g->wave[0], *b = &g->wave[1];
     const double cross = a->a * b->b - a->b * b->a;
     const double aa = a->a * a->a + a->b * a->b, bb = b->a * b->a + b->b * b->b;
@@ -60,6 +58,22 @@ static double txp_worth(const txp_nodes *n, txp_guess *g) {
     return sum;
 }
 
+/* Fit a guess, with a field where that helps, and judge it. 0: no memory. */
+static int txp_fit_guess(txp_nodes *n, txm_env *env, txp_guess *g, txp_swell *field) {
+    txp_guess wavy;
+    int helps = 0;
+    txp_fit_phases(n, env, g);
+    wavy = *g;
+    g->score = txp_worth(n, g);
+    if (!(fmax(wavy.wave[0].clear, wavy.wave[1].clear) >= TXP_FIELD_FROM)) return 1;
+    if (!txp_find_field(n, env, &wavy, field, &helps)) return 0;
+    if (!helps) return 1;
+    txp_measure(n, &wavy);
+    wavy.score = txp_worth(n, &wavy);
+    if (wavy.score > g->score) *g = wavy;
+    return 1;
+}
+
 /* Try the guesses of one scale. 0: no memory. */
 static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm_env *env,
                          txp_sighting *best) {
@@ -71,23 +85,25 @@ static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm
     if (done) txp_search_view(&spectra, env, offers);
     for (int k = 0; k < TXP_OFFERS && done; k++) {
         txp_nodes nodes;
+        txp_swell field;
         txp_guess g = offers[k];
         if (!(g.score > 0) || best->guess.score >= TXP_CONVINCING) break;
         const int size = txp_size_for(sizes, count, &g);
-        done = txp_nodes_make(&sizes[size], &scratch, &nodes);
+        done = txp_nodes_make(&sizes[size], &scratch, &nodes) &&
+               txp_fit_guess(&nodes, env, &g, &field);
         if (!done) break;
-        txp_fit_phases(&nodes, env, &g);
-        g.score = txp_worth(&nodes, &g);
         if (g.score > best->guess.score) {
             best->guess = g;
             best->size = size;
+            if (g.view.field) best->field = field;
         }
     }
     txm_arena_free(&scratch);
     return done;
 }
 
-/* The view and the waves of a photograph; sizes: its evened pictures. */
+/* The view and the waves of a photograph; sizes: its evened pictures. The view's field is that of
+   *found. */
 static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *env,
                                    txp_sighting *found) {
     memset(found, 0, sizeof *found);
@@ -97,13 +113,14 @@ static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *en
         for (int side = TXP_WINDOW_SIDE; side >= TXP_WINDOW_SIDE / 4; side /= 2) {
             /* small windows only where large ones would be too few */
             if (least < side || (side < TXP_WINDOW_SIDE && least > 4 * side)) continue;
-            if (found->guess.score >= TXP_CONVINCING) return TXM_OK;
+            if (found->guess.score >= TXP_CONVINCING) break;
             if (txm_progress(env, 0.5f * (float)(count - at) / (float)(count + 1), "lattice"))
                 return txm_fail(env, TXM_CANCELLED, "cancelled");
             if (!txp_try_scale(sizes, count, at, side, env, found))
                 return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
         }
     }
+    if (found->guess.view.field) found->guess.view.field = &found->field;
     return TXM_OK;
 }
 

@@ -1,15 +1,17 @@
 #ifndef TEXPATCH_VIEW_H
 #define TEXPATCH_VIEW_H
 
-#include "spectra.h"
+#include "field.h"
 
 /* ---- how a plane was photographed ---------------------------------------------------------- */
 
 /* From a place (x, y) of the photograph to the plane, both centred on the middle and equal there
    to first order: the lens is undone, q = (x, y) (1 + bend r^2 + curl r^4), then the perspective,
-   (X, Y) = q / (1 + tilt_x q_x + tilt_y q_y). A periodic wall is a sum of plane waves in (X, Y). */
+   (X, Y) = q / (1 + tilt_x q_x + tilt_y q_y), then what the field adds, if there is one. A periodic
+   wall is a sum of plane waves in (X, Y). */
 typedef struct txp_view {
     double tilt_x, tilt_y, bend, curl;
+    const txp_swell *field; /* NULL: none */
 } txp_view;
 
 /* A wave on the plane: phase = a X + b Y + shift, in turns; clear: how well it is seen, in the
@@ -35,6 +37,12 @@ static int txp_view_place(const txp_view *v, double x, double y, double place[2]
     m[1] = xx * lxy + xy * lyy;
     m[2] = yx * lxx + yy * lxy;
     m[3] = yx * lxy + yy * lyy;
+    if (v->field) {
+        double moved[2], slopes[4];
+        txp_swell_at(v->field, x, y, moved, slopes);
+        for (int d = 0; d < 2; d++) place[d] += moved[d];
+        for (int i = 0; i < 4; i++) m[i] += slopes[i];
+    }
     return 1;
 }
 
@@ -173,6 +181,7 @@ static void txp_try_column(void *context, int column) {
     txp_guess *list = q->best[column];
     txp_view v;
     memset(list, 0, TXP_GUESSES * sizeof *list);
+    v.field = NULL;
     v.tilt_x = (column - TXP_TILT_STEPS) * TXP_TILT_STEP;
     for (int row = -TXP_TILT_STEPS; row <= TXP_TILT_STEPS; row++) {
         v.tilt_y = row * TXP_TILT_STEP;
