@@ -5222,6 +5222,13 @@ static void txp_add_equation(txp_equations *q, const double *slopes, double besi
     }
 }
 
+/* A number that stays as it is. */
+static void txp_hold(txp_equations *q, int k) {
+    for (int i = 0; i < TXP_NUMBERS; i++) q->a[i > k ? i : k][i > k ? k : i] = 0;
+    q->a[k][k] = 1;
+    q->b[k] = 0;
+}
+
 /* Equations of all nodes, or of all pairs of neighbours. */
 static void txp_collect(const txp_nodes *n, const txp_guess *g, int differences, txp_equations *q) {
     memset(q, 0, sizeof *q);
@@ -5295,9 +5302,9 @@ static void txp_measure(const txp_nodes *n, txp_guess *g) {
     }
 }
 
-/* Fit the view and its waves to the phases; clear of each wave receives how well they agree, and
-   the score their sum. */
-static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
+/* Fit the view and its waves to the phases; clear of each wave receives how well they agree.
+   has_lens 0: the lens stays as it is. */
+static void txp_fit_phases(txp_nodes *n, txm_env *env, int has_lens, txp_guess *g) {
     txp_seeing seeing;
     txp_equations q;
     seeing.nodes = n;
@@ -5315,6 +5322,7 @@ static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
         }
         txp_collect(n, g, differences, &q);
         for (int k = 0; k < TXP_NUMBERS; k++) q.a[k][k] += (k < TXP_VIEWS ? 1e-2 : 1e-6) + 1e-4 * q.a[k][k];
+        for (int k = 2; k < TXP_VIEWS && !has_lens; k++) txp_hold(&q, k);
         txp_solve(q.a, q.b, TXP_NUMBERS);
         for (int k = 0; k < TXP_NUMBERS; k++) *txp_number_of(g, k) += q.b[k];
     }
@@ -5670,6 +5678,7 @@ static int txp_find_field(txp_nodes *n, txm_env *env, txp_guess *g, txp_swell *f
 #define TXP_LEAST_PERIODS 1.5 /* of a wave in half of the longer side                             */
 #define TXP_FIELD_FROM 0.4   /* agreement from which on a field is looked for                    */
 #define TXP_BEND_MOST 0.5    /* of a lens, |bend| and |curl|                                      */
+#define TXP_LENS_HELPS 0.8   /* of the disagreement without a lens: if more is left, there is none */
 #define TXP_FREQUENCY 0.2    /* cycles per pixel, at most, in the picture the phases are read from */
 
 /* What is found: score 0: no pattern. */
@@ -5719,7 +5728,7 @@ static double txp_worth(const txp_nodes *n, txp_guess *g) {
 static int txp_fit_guess(txp_nodes *n, txm_env *env, txp_guess *g, txp_swell *field) {
     txp_guess wavy;
     int helps = 0;
-    txp_fit_phases(n, env, g);
+    txp_fit_phases(n, env, 1, g);
     wavy = *g;
     g->score = txp_worth(n, g);
     if (!(fmax(wavy.wave[0].clear, wavy.wave[1].clear) >= TXP_FIELD_FROM)) return 1;
@@ -5759,6 +5768,32 @@ static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm
     return done;
 }
 
+/* Where stones are laid unevenly a lens always explains some of it: without need there is none.
+   0: no memory. */
+static int txp_doubt_lens(const txp_gray *sizes, txm_env *env, txp_sighting *found) {
+    txm_arena scratch;
+    txp_nodes nodes;
+    txp_guess flat = found->guess;
+    txm_arena_init(&scratch, env);
+    const int done = txp_nodes_make(&sizes[found->size], &scratch, &nodes);
+    if (done) {
+        double with = 0, without = 0;
+        flat.view.bend = flat.view.curl = 0;
+        txp_fit_phases(&nodes, env, 0, &flat);
+        for (int k = 0; k < nodes.waves; k++) {
+            with += 1 - found->guess.wave[k].clear;
+            without += 1 - flat.wave[k].clear;
+        }
+        const double score = txp_worth(&nodes, &flat);
+        if (score > 0 && with > TXP_LENS_HELPS * without) {
+            found->guess = flat;
+            found->guess.score = score;
+        }
+    }
+    txm_arena_free(&scratch);
+    return done;
+}
+
 /* The view and the waves of a photograph; sizes: its evened pictures. The view's field is that of
    *found. */
 static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *env,
@@ -5778,6 +5813,8 @@ static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *en
         }
     }
     if (found->guess.view.field) found->guess.view.field = &found->field;
+    else if (found->guess.score > 0 && !txp_doubt_lens(sizes, env, found))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
     return TXM_OK;
 }
 

@@ -217,6 +217,13 @@ static void txp_add_equation(txp_equations *q, const double *slopes, double besi
     }
 }
 
+/* A number that stays as it is. */
+static void txp_hold(txp_equations *q, int k) {
+    for (int i = 0; i < TXP_NUMBERS; i++) q->a[i > k ? i : k][i > k ? k : i] = 0;
+    q->a[k][k] = 1;
+    q->b[k] = 0;
+}
+
 /* Equations of all nodes, or of all pairs of neighbours. */
 static void txp_collect(const txp_nodes *n, const txp_guess *g, int differences, txp_equations *q) {
     memset(q, 0, sizeof *q);
@@ -290,9 +297,9 @@ static void txp_measure(const txp_nodes *n, txp_guess *g) {
     }
 }
 
-/* Fit the view and its waves to the phases; clear of each wave receives how well they agree, and
-   the score their sum. */
-static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
+/* Fit the view and its waves to the phases; clear of each wave receives how well they agree.
+   has_lens 0: the lens stays as it is. */
+static void txp_fit_phases(txp_nodes *n, txm_env *env, int has_lens, txp_guess *g) {
     txp_seeing seeing;
     txp_equations q;
     seeing.nodes = n;
@@ -310,6 +317,7 @@ static void txp_fit_phases(txp_nodes *n, txm_env *env, txp_guess *g) {
         }
         txp_collect(n, g, differences, &q);
         for (int k = 0; k < TXP_NUMBERS; k++) q.a[k][k] += (k < TXP_VIEWS ? 1e-2 : 1e-6) + 1e-4 * q.a[k][k];
+        for (int k = 2; k < TXP_VIEWS && !has_lens; k++) txp_hold(&q, k);
         txp_solve(q.a, q.b, TXP_NUMBERS);
         for (int k = 0; k < TXP_NUMBERS; k++) *txp_number_of(g, k) += q.b[k];
     }

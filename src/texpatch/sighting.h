@@ -13,6 +13,7 @@
 #define TXP_LEAST_PERIODS 1.5 /* of a wave in half of the longer side                             */
 #define TXP_FIELD_FROM 0.4   /* agreement from which on a field is looked for                    */
 #define TXP_BEND_MOST 0.5    /* of a lens, |bend| and |curl|                                      */
+#define TXP_LENS_HELPS 0.8   /* of the disagreement without a lens: if more is left, there is none */
 #define TXP_FREQUENCY 0.2    /* cycles per pixel, at most, in the picture the phases are read from */
 
 /* What is found: score 0: no pattern. */
@@ -62,7 +63,7 @@ static double txp_worth(const txp_nodes *n, txp_guess *g) {
 static int txp_fit_guess(txp_nodes *n, txm_env *env, txp_guess *g, txp_swell *field) {
     txp_guess wavy;
     int helps = 0;
-    txp_fit_phases(n, env, g);
+    txp_fit_phases(n, env, 1, g);
     wavy = *g;
     g->score = txp_worth(n, g);
     if (!(fmax(wavy.wave[0].clear, wavy.wave[1].clear) >= TXP_FIELD_FROM)) return 1;
@@ -102,6 +103,32 @@ static int txp_try_scale(const txp_gray *sizes, int count, int at, int side, txm
     return done;
 }
 
+/* Where stones are laid unevenly a lens always explains some of it: without need there is none.
+   0: no memory. */
+static int txp_doubt_lens(const txp_gray *sizes, txm_env *env, txp_sighting *found) {
+    txm_arena scratch;
+    txp_nodes nodes;
+    txp_guess flat = found->guess;
+    txm_arena_init(&scratch, env);
+    const int done = txp_nodes_make(&sizes[found->size], &scratch, &nodes);
+    if (done) {
+        double with = 0, without = 0;
+        flat.view.bend = flat.view.curl = 0;
+        txp_fit_phases(&nodes, env, 0, &flat);
+        for (int k = 0; k < nodes.waves; k++) {
+            with += 1 - found->guess.wave[k].clear;
+            without += 1 - flat.wave[k].clear;
+        }
+        const double score = txp_worth(&nodes, &flat);
+        if (score > 0 && with > TXP_LENS_HELPS * without) {
+            found->guess = flat;
+            found->guess.score = score;
+        }
+    }
+    txm_arena_free(&scratch);
+    return done;
+}
+
 /* The view and the waves of a photograph; sizes: its evened pictures. The view's field is that of
    *found. */
 static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *env,
@@ -121,6 +148,8 @@ static txm_status txp_find_pattern(const txp_gray *sizes, int count, txm_env *en
         }
     }
     if (found->guess.view.field) found->guess.view.field = &found->field;
+    else if (found->guess.score > 0 && !txp_doubt_lens(sizes, env, found))
+        return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
     return TXM_OK;
 }
 
