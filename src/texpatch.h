@@ -272,6 +272,8 @@ typedef struct texpatch_straight_desc {
     float focal;     /* focal length of the camera, in longer sides of the photograph as it was
                         taken, 0.1..100 (that for 35 mm film over 36); 0 = 0.85. It only
                         matters for the proportions of what was photographed from the side          */
+    int whole;       /* 1: the largest rectangle of whole periods along each side along which the
+                        pattern repeats, so that it can be tiled; 0: the largest rectangle          */
 } texpatch_straight_desc;
 
 typedef struct texpatch_straight texpatch_straight;
@@ -294,6 +296,10 @@ TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int 
 
 /* How well the pattern agrees with a plane, 0 to 1; 0 if there is none or straight is NULL. */
 TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straight);
+
+/* Along which sides the straight picture is cut to whole periods: 1: x, 2: y, 3: both; 0: none,
+   because desc.whole was 0, nothing was found or nothing repeats upright, or straight is NULL. */
+TEXPATCH_API int texpatch_straight_whole(const texpatch_straight *straight);
 
 /* Draw a picture in register with the photograph, straight; without a pattern: a copy.
 
@@ -387,6 +393,7 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 #include "texpatch/wavy.h"
 #include "texpatch/sighting.h"
 #include "texpatch/frame.h"
+#include "texpatch/whole.h"
 #include "texpatch/rectify.h"
 #endif /* TEXPATCH_IMPLEMENTATION */
 

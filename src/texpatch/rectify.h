@@ -2,13 +2,13 @@
 #define TEXPATCH_RECTIFY_H
 
 #include "check.h"
-#include "frame.h"
+#include "whole.h"
 
 /* ---- drawing a photograph from straight in front ------------------------------------------- */
 
 struct texpatch_straight {
     txm_arena memory; /* holds this block, too */
-    int found;
+    int found, whole;
     int photo_width, photo_height;
     txp_frame frame;
     txp_swell field; /* that of the frame's view, if it points to it */
@@ -155,6 +155,8 @@ static txm_status txp_straight_check(const texpatch_straight_desc *d, txm_env *e
         status = txm_mask_check(&d->mask, "mask", d->photo.width, d->photo.height,
                                 TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
+    if (d->whole != 0 && d->whole != 1)
+        return txm_fail(env, TXM_BAD_ARGUMENT, "whole must be 0 or 1");
     if (!txp_is_within(d->focal, 0, 100) || (d->focal > 0 && d->focal < 0.1f))
         return txm_fail(env, TXM_BAD_ARGUMENT, "focal must be 0.1 to 100 longer sides, or 0");
     return TXM_OK;
@@ -189,6 +191,11 @@ static txm_status txp_straight_search(const texpatch_straight_desc *d, txm_arena
                   axes);
     txp_set_axes(stretch, axes, &s->frame);
     s->found = txp_frame_choose(&s->frame, photo.width, photo.height, cells);
+    if (s->found && d->whole) {
+        txp_look *look = (txp_look *)txm_arena_alloc(scratch, 1, sizeof *look);
+        if (!look) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+        s->whole = txp_frame_whole(&found.guess, &sizes[found.size], &s->frame, look);
+    }
     return TXM_OK;
 }
 
@@ -227,6 +234,10 @@ TEXPATCH_API int texpatch_straight_found(const texpatch_straight *straight, int 
     if (width) *width = straight ? straight->frame.width : 0;
     if (height) *height = straight ? straight->frame.height : 0;
     return straight ? straight->found : 0;
+}
+
+TEXPATCH_API int texpatch_straight_whole(const texpatch_straight *straight) {
+    return straight && straight->found ? straight->whole : 0;
 }
 
 TEXPATCH_API double texpatch_straight_agreement(const texpatch_straight *straight) {

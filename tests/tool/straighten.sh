@@ -27,6 +27,7 @@ check "the wall leans" look courses wall.png 0 0.4
 check "straighten" run 0 straighten wall.png -o a.png --stats stats.json
 check "tells what it made" grep -q '^a.png: .* straight, ' out.log
 check "courses are straight" look courses a.png 0.5 1
+whole="$(figure width) * $(figure height)"
 check "--stats says so" is_true "$(figure found) == 1 && $(figure agreement) > 0.9"
 check "maps in register" run 0 straighten wall.png -o b.png --maps wall-height.png,wall-normal.png \
     --normal 2 --data 1
@@ -41,6 +42,9 @@ check "--mask" run 0 straighten object.png -o m.png --mask mask.png --stats stat
 check "the pattern is found beside the object" is_true "$(figure found) == 1"
 check "--focal" run 0 straighten wall.png -o f.png --focal 50
 check "courses are straight, too" look courses f.png 0.5 1
+check "--periods" run 0 straighten wall.png -o whole.png --periods --stats stats.json
+check "courses are straight" look courses whole.png 0.5 1
+check "and smaller" is_true "$(figure width) * $(figure height) < $whole"
 check "no pattern" warns "nothing in it repeats" straighten noise.png -o n.png --stats stats.json
 check "a copy" look courses n.png 0 0.2
 check "--stats says that, too" is_true "$(figure found) == 0 && $(figure agreement) == 0"

@@ -213,6 +213,42 @@ static void test_wavy(void **state) {
     }
 }
 
+/* A result of whole periods: its sides are so many courses, times a whole number. */
+static void test_whole(void **state) {
+    (void)state;
+    static const double periods[PATTERNS][2] = {{3, 2}, {3, 3}, {2, 2}, {4, 4}, {0, 1}, {2, 2}};
+    const shot s = {15, 80, 4, 1, 0, 0.05, 0};
+    for (int p = 0; p < PATTERNS; p++) {
+        const txm_image photo = photograph((pattern)p, &s, 480, 360, 20);
+        texpatch_straight_desc desc;
+        texpatch_straight *straight;
+        int w, h;
+        double at[3][2];
+        memset(&desc, 0, sizeof desc);
+        desc.photo = photo;
+        desc.focal = 1;
+        desc.whole = 1;
+        assert_int_equal(texpatch_straight_find(&desc, NULL, &straight), TXM_OK);
+        assert_int_equal(texpatch_straight_found(straight, &w, &h), 1);
+        assert_int_equal(texpatch_straight_whole(straight), periods[p][0] > 0 ? 3 : 2);
+        for (int i = 0; i < 3; i++) {
+            double q[2];
+            assert_int_equal(texpatch_straight_source(straight, i == 1 ? w - 0.5 : -0.5,
+                                                      i == 2 ? h - 0.5 : -0.5, q),
+                             1);
+            on_plane(&s, (q[0] + 0.5 - 240) / 240, (q[1] + 0.5 - 180) / 240, at[i]);
+        }
+        for (int i = 0; i < 2; i++) {
+            if (!(periods[p][i] > 0)) continue;
+            const double courses = 10 * (at[1 + i][i] - at[0][i]) / periods[p][i];
+            assert_true(courses > 0.5);
+            assert_between("away from a whole number", fabs(courses - floor(courses + 0.5)), 0, 0.05);
+            assert_between("courses that lean", 10 * (at[1 + i][1 - i] - at[0][1 - i]), -0.1, 0.1);
+        }
+        texpatch_straight_free(straight);
+    }
+}
+
 /* ---- without a pattern -------------------------------------------------------------------- */
 
 static void test_nothing(void **state) {
@@ -234,6 +270,7 @@ static void test_nothing(void **state) {
         desc.photo = photo;
         assert_int_equal(texpatch_straight_find(&desc, NULL, &straight), TXM_OK);
         assert_int_equal(texpatch_straight_found(straight, &w, &h), 0);
+        assert_int_equal(texpatch_straight_whole(straight), 0);
         assert_true(w == side && h == side);
         assert_true(!(texpatch_straight_agreement(straight) > 0));
         assert_int_equal(texpatch_straight_source(straight, 3, 4, source), 1);
@@ -342,6 +379,9 @@ static void test_refused(void **state) {
     desc.focal = -1;
     assert_int_equal(texpatch_straight_find(&desc, &env, &straight), TXM_BAD_ARGUMENT);
     desc.focal = 0;
+    desc.whole = 2;
+    assert_int_equal(texpatch_straight_find(&desc, &env, &straight), TXM_BAD_ARGUMENT);
+    desc.whole = 0;
     assert_null(straight);
     assert_int_equal(texpatch_straight_find(&desc, &env, &straight), TXM_OK);
     const txm_image out = new_image(64, 48, 3, TXM_U8);
@@ -369,6 +409,7 @@ static txm_status find_it(void *context, txm_env *env) {
     texpatch_straight *straight;
     memset(&desc, 0, sizeof desc);
     desc.photo = f->photo;
+    desc.whole = 1;
     const txm_status status = texpatch_straight_find(&desc, env, &straight);
     assert_true((status == TXM_OK) == (straight != NULL));
     texpatch_straight_free(straight);
@@ -415,6 +456,7 @@ int main(void) {
         cmocka_unit_test_teardown(test_turned, release_all),
         cmocka_unit_test_teardown(test_lens, release_all),
         cmocka_unit_test_teardown(test_wavy, release_all),
+        cmocka_unit_test_teardown(test_whole, release_all),
         cmocka_unit_test_teardown(test_nothing, release_all),
         cmocka_unit_test_teardown(test_drawing, release_all),
         cmocka_unit_test_teardown(test_refused, release_all),

@@ -164,7 +164,7 @@ static int straighten_all(patch_job *j) {
             pictures[count].image = &x->guide;
             pictures[count++].map = &data;
         }
-        status = straighten(&j->run, j->exemplar_names.at[e], pictures, count, &mask, 0,
+        status = straighten(&j->run, j->exemplar_names.at[e], pictures, count, &mask, 0, 0,
                             &agreement);
     }
     return status;

@@ -19,6 +19,8 @@ static const cli_manual straighten_manual = {
     "--maps M1,M2 are pictures in register with PHOTO. They are straightened with it and named\n"
     "  after the part of their name that PHOTO's lacks: bricks-normal.png becomes OUT-normal.png.\n"
     "--focal matters only for the proportions of what was photographed from the side.\n"
+    "--periods cuts along each side along which the pattern repeats: what was 7.4 bricks wide becomes\n"
+    "  5 or 6 wide, and its right border goes on at its left.\n"
     "'found' of --stats is 1 if there is a pattern; 'agreement', 0 to 1, is how well it agrees\n"
     "with a plane.\n",
     "  texkit straighten wall.jpg -o straight.png\n"
@@ -28,19 +30,22 @@ static const cli_manual straighten_manual = {
 /* ---- for every command ---------------------------------------------------------------------- */
 
 int straighten(cli *run, const char *path, const straight_picture *pictures, int count,
-               const txm_image *mask, double focal, double *agreement) {
+               const txm_image *mask, double focal, int whole, double *agreement) {
     texpatch_straight_desc desc = {0};
     texpatch_straight *straight = NULL;
     int width, height, status = CLI_DONE;
     desc.photo = *pictures[0].image;
     if (mask) desc.mask = *mask;
     desc.focal = (float)focal;
+    desc.whole = whole;
     txm_status result = texpatch_straight_find(&desc, &run->env, &straight);
     if (result != TXM_OK) return check_result(run, result, path);
     const int found = texpatch_straight_found(straight, &width, &height);
     *agreement = texpatch_straight_agreement(straight);
     if (!found)
         cli_warn(run, "'%s': nothing in it repeats clearly; it is left as it is", path);
+    else if (whole && !texpatch_straight_whole(straight))
+        cli_warn(run, "'%s': nothing in it repeats upright or level; it is not cut", path);
     for (int i = 0; i < count && found && !status; i++) {
         txm_image *image = pictures[i].image, out;
         status = new_picture(run, width, height, image->channels, image->sample, &out);
@@ -59,7 +64,7 @@ int straighten(cli *run, const char *path, const straight_picture *pictures, int
 typedef struct straighten_job {
     cli run;
     const char *map_list, *normals, *labels, *data, *mask_path, *focal;
-    int directx;
+    int directx, whole;
     int count; /* PHOTO and its maps */
     char names[1 + MAX_STRAIGHT_MAPS][MAX_PATH], outputs[1 + MAX_STRAIGHT_MAPS][MAX_PATH];
     texpatch_map kinds[1 + MAX_STRAIGHT_MAPS];
@@ -151,6 +156,8 @@ static int run_job(straighten_job *j, int argc, char **argv) {
          &j->mask_path, 0, 0},
         {CLI_TEXT, "--focal", "MM", "focal length of the camera, that for 35 mm film; default 31",
          &j->focal, 0, 0},
+        {CLI_FLAG, "--periods", NULL, "cut OUT to whole periods of the pattern, so that it tiles",
+         &j->whole, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (cli_begin(run, &straighten_manual, options, argc, argv, &status)) return status;
@@ -165,7 +172,7 @@ static int run_job(straighten_job *j, int argc, char **argv) {
     }
     cli_stage(run, "straighten");
     status = straighten(run, run->inputs[0], pictures, j->count, &j->mask, focal / FILM_WIDTH,
-                        &agreement);
+                        j->whole, &agreement);
     if (status) return status;
     cli_figure(run, "found", agreement > 0);
     cli_figure(run, "agreement", agreement);

@@ -307,7 +307,7 @@ static int straighten_photos(cli *run, photos *p, unsigned data, const char *nam
             pictures[m].image = &p->images[e][m];
             pictures[m].map = data >> m & 1 ? &quantity : NULL;
         }
-        status = straighten(run, name, pictures, p->exemplars[e].map_count, NULL, 0, &agreement);
+        status = straighten(run, name, pictures, p->exemplars[e].map_count, NULL, 0, 0, &agreement);
     }
     return status;
 }
