@@ -17,7 +17,8 @@ enum {
 #define TXP_ALIKE_PART 0.8   /* of the range of likeness, and ...                                     */
 #define TXP_ALIKE_MOST 0.87  /* ... of the most: a side where it is more may be whole                 */
 #define TXP_PHASE_BACK 0.08  /* turns by which the phase of a wave may differ after a whole side      */
-#define TXP_WHOLE_WAVES 3.0  /* of one wave along a side, at least: else nothing repeats along it     */
+#define TXP_WHOLE_WAVES 3.0  /* of one wave along a side, at least: fewer say nothing                 */
+#define TXP_ALIKE_ALONE 0.5  /* likeness, and its range, at least, where no wave tells of a period    */
 
 typedef struct txp_look {
     int width, height;
@@ -98,19 +99,21 @@ static double txp_whole_side(const txp_guess *g, const txp_frame *f, txp_look *k
         turns[i] = is_down ? (f->xx * w->b - f->xy * w->a) / det : (f->yy * w->a - f->yx * w->b) / det;
         waves = fmax(waves, fabs(turns[i]) * side * k->step);
     }
-    if (waves < TXP_WHOLE_WAVES) return 0;
+    const int is_alone = waves < TXP_WHOLE_WAVES;
     for (int i = from - 1; i <= to + 1; i++) {
         if (i < 0 || i > side) return 0;
         k->alike[i] = txp_look_alike(k, is_down, i);
         most = fmax(most, k->alike[i]);
         least = fmin(least, k->alike[i]);
     }
+    if (is_alone && (most < TXP_ALIKE_ALONE || most - least < TXP_ALIKE_ALONE)) return 0;
     for (int i = to; i >= from; i--) {
         const double l = k->alike[i - 1], c = k->alike[i], r = k->alike[i + 1];
         if (c < l || c < r || c < TXP_ALIKE_MOST * most) continue;
         if (c < least + TXP_ALIKE_PART * (most - least)) continue;
         const double top = l + r < 2 * c ? 0.5 * (l - r) / (l + r - 2 * c) : 0;
-        const double length = txp_phases_back(turns, (i + top) * k->step);
+        const double by = (i + top) * k->step;
+        const double length = is_alone ? by : txp_phases_back(turns, by);
         if (length > 0) return length;
     }
     return 0;
