@@ -52,6 +52,17 @@ refuses() {
     check "status $status, \"$text\": $(echo "$*" | tail -c 70)" refuses_so "$status" "$text" "$@"
 }
 
+# warns TEXT ARGUMENTS...: it succeeds with one line on stderr, a warning that holds this text
+warns() {
+    text=$1
+    shift
+    "$texkit" "$@" >out.log 2>err.log || { cat err.log; return 1; }
+    [ "$(wc -l <err.log)" = 1 ] && grep -q '^texkit [a-z]*: warning: ' err.log && says "$text" && return
+    echo "not one warning that holds '$text':"
+    cat err.log
+    return 1
+}
+
 # stops OUT ARGUMENTS...: a signal ends the run of $released with status 1, a message and no OUT
 stops() {
     out=$1

@@ -9,16 +9,6 @@ texkit=$root/$OUT/asan/texkit # with the sanitizers
 look() { /usr/bin/python3 "$root/tests/tool/check_even.py" "$@"; }
 cd "$tmp" || exit 1
 look draw .
-# warns TEXT ARGUMENTS...: it succeeds with one line of warning that holds this text
-warns() {
-    text=$1
-    shift
-    "$texkit" "$@" >out.log 2>err.log || { cat err.log; return 1; }
-    [ "$(wc -l <err.log)" = 1 ] && grep -q '^texkit [a-z]*: warning: ' err.log && says "$text" && return
-    echo "not one warning that holds '$text':"
-    cat err.log
-    return 1
-}
 figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 is() { [ "$1" = "$2" ] || { echo "$1 instead of $2"; return 1; }; }
 differ() { ! cmp -s "$1" "$2"; }
