@@ -102,9 +102,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (set) {
         look_at_lines(set, 0);
         const txm_image layers = fresh_image(&p, &s, set->width, set->height, 1, TXM_U8);
+        plan_trouble(&t, &s);
         const int success = succeeded(texedges_layers(&in.desc, set, &env, &layers), &t, &env);
         look_at_results(success, &layers, 1);
         const txm_image over = fresh_image(&p, &s, 1 + pick(&s, 100), 1 + pick(&s, 100), 1 + 2 * pick(&s, 2), TXM_U8);
+        plan_trouble(&t, &s);
         const txm_status status = texedges_draw(set, pick(&s, set->levels + 2) - 1, &env, &over);
         look_at_results(succeeded(status, &t, &env), &over, 1);
         make_strokes(&in, &s, set);

@@ -124,14 +124,18 @@ static void poisson(pool *p, source *s) {
     for (int y = 0; y < height; y++)
         memcpy(txm_image_row(&before, y), txm_image_row(&d.image, y), (size_t)(width * channels) * sizeof(float));
     const int success = succeeded(txm_poisson(&d, &env), &t, &env);
+    uint8_t *counts = (uint8_t *)malloc((size_t)width * (size_t)height);
+    if (!counts) exit(1);
+    if (success) txm_mask_read(&d.mask, TXM_MASK_REPLACES, counts);
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
             const size_t pixel = (size_t)channels * sizeof(float);
-            if (success && txm_image_get(&d.mask, x, y, 0) > 0) continue;
+            if (success && counts[y * width + x]) continue;
             if (memcmp((const char *)txm_image_row(&before, y) + pixel * (size_t)x,
                        (const char *)txm_image_row(&d.image, y) + pixel * (size_t)x, pixel) != 0)
                 abort();
         }
+    free(counts);
     if (success && !txm_image_is_finite(&d.image)) abort();
     fuzz_succeeded += success;
     if (t.memory.blocks) abort();
