@@ -266,7 +266,7 @@ def damages(doc):
         squares_with_edges = {kind, doc["kind"]} == {"wang", "frame"}
         if kind != doc["kind"] and not squares_with_edges:
             yield True, "kind " + kind, put("kind", value=kind)
-    yield True, "size 31", put("size", value=31)
+    yield True, "size 7", put("size", value=7)
     yield True, "size as text", put("size", value=str(doc["size"]))
     yield True, "size with a fraction", put("size", value=doc["size"] + 0.5)
     yield True, "colors 5", put("colors", value=5)

@@ -68,7 +68,9 @@ static txm_image view(void *pixels, int channels, txm_sample sample) {
 static unsigned char *encode(const txm_image *image, size_t *size) {
     unsigned char *bytes;
     const char *why;
+    why = NULL;
     if (!image_encode(NULL, ".png", image, &bytes, size, &why)) fail_msg("%s", why);
+    assert_null(why); /* is set by failures only */
     return bytes;
 }
 

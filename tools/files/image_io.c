@@ -176,7 +176,8 @@ static const char *name_stranger(const unsigned char *bytes, size_t size) {
 
 int image_decode(image_job *job, const unsigned char *bytes, size_t size, txm_image *image,
                  const char **why) {
-    image_source s = {bytes, size, job, why, IMAGE_UPRIGHT};
+    const char *reason = image_damaged; /* readers set it beforehand, for libraries that jump home */
+    image_source s = {bytes, size, job, &reason, IMAGE_UPRIGHT};
     const format *f = find_format(bytes, size);
     memset(image, 0, sizeof *image);
     job->is_cancelled = 0;
@@ -188,10 +189,11 @@ int image_decode(image_job *job, const unsigned char *bytes, size_t size, txm_im
         if (sample != image->sample) image_warn(&s, "it has 16 bits a sample, of which 8 are used");
         ok = image_convert(image, job->channels ? job->channels : own, sample) &&
              image_turn(image, s.orientation);
-        if (!ok) *why = image_no_memory;
+        if (!ok) reason = image_no_memory;
     }
-    if (!ok) image_free(image);
-    return ok;
+    if (ok) return 1;
+    image_free(image);
+    return *why = reason, 0;
 }
 
 int image_load(image_job *job, const char *path, txm_image *image, const char **why) {
@@ -272,10 +274,13 @@ static int write_by_stb(image_target *t, kind k, const txm_image *image) {
 }
 
 /* Hand over what a writer made, if it made all of it. */
-static int hand_over(image_target *t, int ok, unsigned char **bytes, size_t *size) {
+static int hand_over(image_target *t, int ok, unsigned char **bytes, size_t *size, const char **why) {
     if (ok && t->is_full) *t->why = image_no_memory;
     ok = ok && !t->is_full;
-    if (!ok) free(t->bytes);
+    if (!ok) {
+        *why = *t->why;
+        free(t->bytes);
+    }
     *bytes = ok ? t->bytes : NULL;
     *size = ok ? t->size : 0;
     return ok;
@@ -284,7 +289,8 @@ static int hand_over(image_target *t, int ok, unsigned char **bytes, size_t *siz
 int image_encode(image_job *job, const char *extension, const txm_image *image, unsigned char **bytes,
                  size_t *size, const char **why) {
     txm_image im = txm_image_resolve(*image), narrow;
-    image_target t = {NULL, 0, 0, 0, job, why};
+    const char *reason = image_no_memory;
+    image_target t = {NULL, 0, 0, 0, job, &reason};
     const kind k = kind_of(extension);
     int ok;
     *bytes = NULL;
@@ -307,15 +313,16 @@ int image_encode(image_job *job, const char *extension, const txm_image *image, 
     default: ok = write_by_stb(&t, k, &im); break;
     }
     image_free(&narrow);
-    return hand_over(&t, ok, bytes, size);
+    return hand_over(&t, ok, bytes, size, why);
 }
 
 int image_encode_indexed(image_job *job, const txm_image *labels, const unsigned char palette[256][3],
                          unsigned char **bytes, size_t *size, const char **why) {
     const txm_image im = txm_image_resolve(*labels);
-    image_target t = {NULL, 0, 0, 0, job, why};
+    const char *reason = image_no_memory;
+    image_target t = {NULL, 0, 0, 0, job, &reason};
     if (job) job->is_cancelled = 0;
-    return hand_over(&t, png_write(&t, &im, palette), bytes, size);
+    return hand_over(&t, png_write(&t, &im, palette), bytes, size, why);
 }
 
 int image_write(const char *path, const txm_image *image, const char **why) {
