@@ -218,6 +218,8 @@ int patch_check_options(patch_job *j) {
         return cli_fail(run, CLI_USAGE, "--guide-weight 0: leave out --target or --control "
                         "instead");
     if (!status) status = check_even(run, j->even);
+    /* guides tell places of the exemplar apart, perhaps by their light; kept pixels keep theirs */
+    if (j->even == EVEN_AUTO && (j->guides || j->control || j->kept_list)) j->even = 0;
     if (!status) status = parse_lattice(j);
     if (!status) status = parse_maps(j);
     return status;
