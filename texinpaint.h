@@ -2232,11 +2232,24 @@ static int txi_has_alpha(const txi_domain *d, int map) {
     return !(kind && (kind->is_normal || kind->is_label)) && d->maps[map].channels % 2 == 0;
 }
 
-/* Continue the visible colours of all maps into what is transparent. */
+/* Continue the visible colours of all maps into what is transparent in the hole. Known texels stay, to
+   the byte. */
 static txm_status txi_bleed(const txi_domain *d, txm_env *env) {
+    const size_t count = (size_t)d->width * (size_t)d->height;
     txm_status status = TXM_OK;
-    for (int map = 0; map < d->map_count && status == TXM_OK; map++)
-        if (txi_has_alpha(d, map)) status = txm_image_bleed(&d->maps[map], 0, env);
+    txm_arena arena;
+    uint8_t *hole = NULL;
+    txm_arena_init(&arena, env);
+    for (int map = 0; map < d->map_count && status == TXM_OK; map++) {
+        if (!txi_has_alpha(d, map)) continue;
+        if (!hole) {
+            hole = (uint8_t *)txm_arena_alloc(&arena, count, 1);
+            if (!hole) status = txi_no_memory(env);
+            else txm_mask_read(&d->desc->mask, TXM_MASK_REPLACES, hole);
+        }
+        if (status == TXM_OK) status = txm_image_bleed_part(&d->maps[map], hole, 0, env);
+    }
+    txm_arena_free(&arena);
     return status;
 }
 

@@ -870,7 +870,8 @@ static inline int txm_image_is_normals(const txm_image *image) {
 
        in       txm_image_bled: hidden colour is replaced by that of the visible neighbours
        between  txm_mean: averages in which colour counts as much as it shows
-       out      txm_image_bleed: so that other programs' filters show no fringe               */
+       out      txm_image_bleed: so that other programs' filters show no fringe; where pixels are
+                kept to the byte, txm_image_bleed_part of the others                          */
 
 /* non-zero if the last channel is alpha: gray + alpha or RGBA */
 static inline int txm_image_has_alpha(const txm_image *image) {
@@ -963,6 +964,7 @@ typedef struct txm_bleed_level {
 
 typedef struct txm_bleed {
     txm_image image;
+    const uint8_t *part; /* NULL, or a byte for each pixel: 0 where its colour stays            */
     int wrap, lanes, levels;
     int at; /* the level that is made now                                                       */
     txm_bleed_level level[TXM_BLEED_LEVELS]; /* 0: unused, it is the image                      */
@@ -1037,6 +1039,7 @@ static inline void txm_bleed_push(void *context, int y) {
     if (b->at == 0) {
         for (int x = 0; x < b->image.width; x++) {
             if (txm_image_get(&b->image, x, y, colours) > 0) continue;
+            if (b->part && !b->part[(size_t)y * (size_t)b->image.width + (size_t)x]) continue;
             txm_bleed_above(b, x, y, colour);
             for (int c = 0; c < colours; c++)
                 txm_image_set(&b->image, x, y, c, txm_float(colour[c]));
@@ -1088,11 +1091,13 @@ static inline void txm_bleed_run(txm_bleed *b, const txm_env *env) {
 
    image   in place; 1 or 3 channels, or nothing hidden: left as it is. Samples of any type; float
            ones must be finite where they show
+   part    NULL: everywhere; or width * height bytes, row after row: 0 where even hidden colours stay
    wrap    TXM_WRAP_X | TXM_WRAP_Y: the picture tiles that way
    return  TXM_OK; TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY: image is untouched
    cost    a look at alpha if nothing is hidden; else about 50 ns per pixel on one thread, and
            (channels) * 4 / 3 bytes per pixel                                              */
-static inline txm_status txm_image_bleed(const txm_image *image, int wrap, txm_env *env) {
+static inline txm_status txm_image_bleed_part(const txm_image *image, const uint8_t *part, int wrap,
+                                              txm_env *env) {
     txm_bleed b;
     txm_arena arena;
     txm_status status = txm_image_check(image, "image", 0, env);
@@ -1103,9 +1108,17 @@ static inline txm_status txm_image_bleed(const txm_image *image, int wrap, txm_e
     txm_bleed_begin(&b, &im, wrap, &arena);
     if (arena.failed)
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to continue visible colours");
-    else txm_bleed_run(&b, env);
+    else {
+        b.part = part;
+        txm_bleed_run(&b, env);
+    }
     txm_arena_free(&arena);
     return status;
+}
+
+/* The same, everywhere. */
+static inline txm_status txm_image_bleed(const txm_image *image, int wrap, txm_env *env) {
+    return txm_image_bleed_part(image, NULL, wrap, env);
 }
 
 /* The image as it is if nothing is hidden in it, else a copy whose hidden colour is bled: what a

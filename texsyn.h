@@ -292,8 +292,8 @@ typedef struct texsyn_fill_desc {
    removal). Holes are filled in windows of at most 256 x 256 pixels of hole.
 
    env    NULL, or how to allocate, report and spread the work
-   out    form of the image, may be the image itself: known pixels are copied, with the same bytes,
-          but for hidden colour. Untouched after an error
+   out    form of the image, may be the image itself: known pixels are copied, with the same bytes.
+          Untouched after an error
    return TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, pictures that do not match, a mask
           that is empty or covers all, known samples that are not finite or beyond a million;
           TXM_TOO_SMALL if fewer than 256 pixels can be learned from; TXM_TOO_LARGE above
@@ -6506,7 +6506,10 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
         if (filler.given && desc->relight) txs_fill_relight(&filler, filler.given);
         status = txs_fill_windows(&filler, &arena, env);
     }
-    if (status == TXM_OK) status = txm_image_bleed(&filler.image, 0, env);
+    if (status == TXM_OK && txm_image_has_alpha(&filler.image)) { /* known pixels stay, to the byte */
+        txm_mask_read(&desc->mask, TXM_MASK_REPLACES, filler.state);
+        status = txm_image_bleed_part(&filler.image, filler.state, 0, env);
+    }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
     return status;

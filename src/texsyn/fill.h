@@ -707,7 +707,10 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
         if (filler.given && desc->relight) txs_fill_relight(&filler, filler.given);
         status = txs_fill_windows(&filler, &arena, env);
     }
-    if (status == TXM_OK) status = txm_image_bleed(&filler.image, 0, env);
+    if (status == TXM_OK && txm_image_has_alpha(&filler.image)) { /* known pixels stay, to the byte */
+        txm_mask_read(&desc->mask, TXM_MASK_REPLACES, filler.state);
+        status = txm_image_bleed_part(&filler.image, filler.state, 0, env);
+    }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);
     return status;

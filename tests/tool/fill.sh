@@ -44,7 +44,7 @@ check "--model" run 0 fill sand.png --mask mask-disc.png -o m.png --model sand.t
 check "only the region changes with a model" look kept sand.png mask-disc.png m.png 0.8
 check "--relight" run 0 fill sand.png --mask mask-disc.png -o l.png --model sand.txs --relight
 refuses 2 "without --model" fill sand.png --mask mask-disc.png -o n.png --relight
-check "--source" run 0 fill sand.png --mask mask-disc.png -o u.png --source mask-edge.png
+check "--source" warns "white in 4.4 %" fill sand.png --mask mask-disc.png -o u.png --source mask-edge.png
 check "the source makes a difference" sh -c "! cmp -s a.png u.png"
 
 refuses 2 "add --mask" fill sand.png -o n.png

@@ -254,13 +254,8 @@ static void test_alpha(void **state) {
         if (is_mesh) use_mesh(&d);
         complete_bytes(&d, result);
         int opaque = 0, clear = 0;
-        for (int i = 0; i < PIXELS; i++) {
-            uint8_t *p = picture + 4 * i, *q = result + 4 * i;
-            if (mask[i]) continue;
-            assert_memory_equal(q + 3, p + 3, 1);
-            if (p[3]) assert_memory_equal(q, p, 3);
-            else if (q[0] > 40 || q[2] > 40) fail_msg("hidden %d %d %d", q[0], q[1], q[2]);
-        }
+        for (int i = 0; i < PIXELS; i++)
+            if (!mask[i]) assert_memory_equal(result + 4 * i, picture + 4 * i, 4);
         memcpy(other, picture, sizeof picture);
         for (int i = 0; i < PIXELS; i++) /* what is hidden makes no difference */
             if (!mask[i] && !picture[4 * i + 3]) memset(other + 4 * i, at_random(i, 1, 3), 3);
@@ -268,7 +263,8 @@ static void test_alpha(void **state) {
         e.image.pixels = other;
         static uint8_t again[4 * PIXELS];
         complete_bytes(&e, again);
-        assert_memory_equal(again, result, sizeof again);
+        for (int i = 0; i < PIXELS; i++)
+            assert_memory_equal(again + 4 * i, (mask[i] ? result : other) + 4 * i, 4);
         for (int i = 0; i < PIXELS; i++) {
             const uint8_t *p = result + 4 * i;
             if (!mask[i]) continue;

@@ -31,16 +31,6 @@ static inline int pick(source *s, int count) {
     return (256 * high + low) % count;
 }
 
-/* Do two pixels show the same? All bytes are equal, but for the colour that alpha 0 hides. */
-static inline int shows_same(const void *a, const void *b, int channels, txm_sample sample, int has_alpha) {
-    const size_t bytes = txm_sample_bytes(sample), colours = bytes * (size_t)(channels - 1);
-    static const char none[4] = {0, 0, 0, 0};
-    if (has_alpha && !memcmp((const char *)a + colours, none, bytes) &&
-        !memcmp((const char *)b + colours, none, bytes))
-        return 1;
-    return !memcmp(a, b, bytes * (size_t)channels);
-}
-
 /* ---- memory ------------------------------------------------------------------------------- */
 
 typedef struct memory { /* an allocator whose call fail_at fails */
