@@ -45,7 +45,9 @@ def make(kind):
     if kind == "turned":  # orientation 6: its first row is the right side of the upright picture
         turned = [[rows[y][WIDTH - 1 - r] for y in range(HEIGHT)] for r in range(WIDTH)]
         return png(turned, 0, 8, HEIGHT, WIDTH, exif(6))
-    if kind == "gamma":
+    if kind == "mask":  # white but for a strip, and of another gamma
+        rows = [[255 if x > 3 else 0 for x in range(WIDTH)] for y in range(HEIGHT)]
+    if kind in ("gamma", "mask"):
         return png(rows, 0, 8, WIDTH, HEIGHT, chunk(b"gAMA", struct.pack(">I", 100000)))
     if kind == "key":
         rows = [[0 if (x // 8 + y // 8) % 3 == 0 else v for x, v in enumerate(row)] for y, row in enumerate(rows)]

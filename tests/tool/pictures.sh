@@ -7,7 +7,7 @@ root=$(pwd)
 texkit=$root/$OUT/asan/texkit # with the sanitizers
 make_picture() { /usr/bin/python3 "$root/tests/tool/pictures.py" "$@"; }
 cd "$tmp" || exit 1
-for kind in upright turned gamma key huge long sum; do make_picture $kind $kind.png; done
+for kind in upright turned gamma mask key huge long sum; do make_picture $kind $kind.png; done
 size="--size 48x48"
 
 # warns COUNT TEXT ARGUMENTS...: it is done, with so many lines that hold this text, and no others
@@ -22,8 +22,8 @@ warns() {
 check "a gamma of 1: one warning" warns 1 "'gamma.png': its gamma" patch gamma.png -o a.png $size
 check "none with --quiet" warns 0 "" patch gamma.png -o b.png $size --quiet
 check "the same picture" cmp a.png b.png
-check "the same warning for a mask" warns 1 "'gamma.png': its gamma" \
-    patch upright.png -o a.png $size --mask gamma.png
+check "the same warning for a mask" warns 1 "'mask.png': its gamma" \
+    patch upright.png -o a.png $size --mask mask.png
 check "and for a map" warns 1 "'gamma.png': its gamma" patch upright.png -o a.png $size --maps gamma.png
 check "and for an exemplar of learn" warns 1 "'gamma.png': its gamma" learn gamma.png -o a.txs --even 0
 check "and of synth" warns 1 "'gamma.png': its gamma" synth gamma.png -o a.png --size 9x9 --even 0
