@@ -158,8 +158,8 @@ check "two maps" test -f comma-2-height.png -a -f comma-2-plain-height.png
 check "a semicolon" run 0 $patch -o semicolon.png --exemplars rock,wet.png --maps 'rock\;dry.png;rock;dry.png'
 check "tiles --maps" run 0 tiles cells.png -o listed --kind frame --size 32 --maps 'rock\,wet.png,plain-height.png'
 check "two maps" sh -c "test -f listed/atlas-3.png && ! test -e listed/atlas-4.png"
-"$draw" discs 'used,cells.png' 64 -16,-16,96,96
-"$draw" discs used-sand.png 48 -12,-12,72,72
+"$draw" discs 'used,cells.png' 64 -8,-8,80,80
+"$draw" discs used-sand.png 48 -6,-6,60,60
 check "--mask" run 0 $patch -o masked.png --exemplars sand.png --mask 'used\,cells.png,used-sand.png'
 refuses 2 "empty" $patch -o n.png --maps 'plain-height.png,'
 refuses 2 "empty" $patch -o n.png --maps ',plain-height.png'
