@@ -256,6 +256,9 @@ check "the same plane" $check_patch part far.png window.png 3 5
 check "another seed" window window.png -20 -30 1 90 --seed 2
 check "another plane" fails $check_patch part plane.png window.png 0 0
 
+check "JPEG takes 8 of 16 bits, and it says so" warns "takes 8" patch bricks-height.png -o deep.jpg $size
+check "so does TGA, for a map" warns "takes 8" patch bricks.png -o deep.tga $size --maps bricks-height.png
+
 # ---- usage errors: status 2; there are many, and the sanitizers take their time to begin
 sanitized=$texkit
 [ "$FULL" = 1 ] || texkit=$released
@@ -269,8 +272,6 @@ refuses 2 "pixels in all" bricks.png -o n.png --size 100000x100000
 for name in n.gif n.txs n; do refuses 2 "end the name" bricks.png -o $name $size; done
 refuses 2 "65500" bricks.png -o n.jpg --size 70000x64
 refuses 2 "alpha" rgba.png -o n.jpg $size
-check "JPEG takes 8 of 16 bits, and it says so" warns "takes 8" patch bricks-height.png -o n.jpg $size
-check "so does TGA, for a map" warns "takes 8" patch bricks.png -o n.tga $size --maps bricks-height.png
 for bad in -1 17 x 1.5; do refuses 2 "--passes" bricks.png -o n.png $size --passes $bad; done
 for bad in 0 -4 x 1000000; do refuses 2 "--patch" bricks.png -o n.png $size --patch $bad; done
 for bad in 0 3 5 x; do refuses 2 "--turns" bricks.png -o n.png $size --turns $bad; done
