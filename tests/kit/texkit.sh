@@ -63,6 +63,9 @@ warns() {
     return 1
 }
 
+# figure NAME: its value in stats.json
+figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
+
 # stops OUT ARGUMENTS...: a signal ends the run of $released with status 1, a message and no OUT
 stops() {
     out=$1

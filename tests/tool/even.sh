@@ -9,7 +9,6 @@ texkit=$root/$OUT/asan/texkit # with the sanitizers
 look() { /usr/bin/python3 "$root/tests/tool/check_even.py" "$@"; }
 cd "$tmp" || exit 1
 look draw .
-figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 is() { [ "$1" = "$2" ] || { echo "$1 instead of $2"; return 1; }; }
 differ() { ! cmp -s "$1" "$2"; }
 tileable="--size 96x96 --tileable --passes 1"

@@ -31,7 +31,6 @@ refuses_quickly() {
 nothing_changed() {
     [ "$before" = "$(all_files)" ] || { echo "files were made or changed"; ls -l; return 1; }
 }
-figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 figures() { # NAME=VALUE...: these are in stats.json
     for wish in "$@"; do
         [ "$(figure "${wish%%=*}")" = "${wish#*=}" ] || { echo "not $wish"; cat stats.json; return 1; }

@@ -13,7 +13,6 @@ check_tool() { # NAME ARGUMENTS...: tests/tool/check_NAME.py
     $python "$root/tests/tool/check_$name.py" "$@"
 }
 cd "$tmp" || exit 1
-figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 
 "$root/build/draw" sand sand.png 48
 "$root/build/draw" cells cells.png 64

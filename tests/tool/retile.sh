@@ -20,7 +20,6 @@ counts() {
     esac
 }
 ply_count() { head -c 2000 "$2" | LC_ALL=C sed -n "/^end_header/q; s/^element $1 //p"; }
-figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 figures() { # NAME=VALUE...: these are in stats.json
     for wish in "$@"; do
         [ "$(figure "${wish%%=*}")" = "${wish#*=}" ] || { echo "not $wish"; cat stats.json; return 1; }

@@ -9,18 +9,7 @@ texkit=$root/$OUT/asan/texkit # with the sanitizers
 look() { /usr/bin/python3 "$root/tests/tool/check_straighten.py" "$@"; }
 cd "$tmp" || exit 1
 look draw .
-figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 is_true() { awk "BEGIN { exit !($*) }" || { echo "not $*"; return 1; }; }
-# warns TEXT ARGUMENTS...: it succeeds with one line of warning that holds this text
-warns() {
-    text=$1
-    shift
-    "$texkit" "$@" >out.log 2>err.log || { cat err.log; return 1; }
-    [ "$(wc -l <err.log)" = 1 ] && grep -q '^texkit [a-z]*: warning: ' err.log && says "$text" && return
-    echo "not one warning that holds '$text':"
-    cat err.log
-    return 1
-}
 check "the wall leans" look courses wall.png 0 0.4
 
 # ---- texkit straighten

@@ -13,7 +13,6 @@ glbs=$root/$OUT/glb/tree # kept: .ci/run hands them to the Khronos validator and
 rm -rf "$glbs" && mkdir -p "$glbs"
 cd "$tmp" || exit 1
 
-figure() { sed -n "s/,*$//; s/^ *\"$1\": //p" stats.json; }
 figures() { # NAME=VALUE...: these are in stats.json
     for wish in "$@"; do
         [ "$(figure "${wish%%=*}")" = "${wish#*=}" ] || { echo "not $wish"; cat stats.json; return 1; }
