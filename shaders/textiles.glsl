@@ -26,8 +26,11 @@
            color = textiles_fetch(albedo, s) * shade(textiles_fetch(bumps, s));
        }
 
-     where all maps of a set use the same spot. Outside uniform control flow pass the derivatives
-     of the place yourself, as here.
+     where all maps of a set use the same spot. Outside uniform control flow pass the derivatives of
+     the place yourself, as here.
+
+     Drivers filter without looking at alpha. A picture with translucent parts is uploaded with its
+     colour multiplied by alpha; the result is what textiles_draw_plane draws, multiplied likewise.
 
    UNIFORMS
      The fields of textiles_plane are those of textiles_plane and textiles_layout in textiles.h:

@@ -7,7 +7,8 @@
    a graphics card), and prints "ok - what" or "not ok - what" for each test.
 
    Lookups: sets of smooth random pictures, each kind and packing, at views that meet texels exactly,
-   between them, turned and enlarged; compared pixel by pixel with textiles_draw_plane.
+   between them, turned and enlarged; compared pixel by pixel with textiles_draw_plane. Translucent
+   pictures are uploaded with colour multiplied by alpha, as textiles_draw_plane weights it.
 
    Levels: pictures whose mip-map levels show their number; it must be that of the view.
 
@@ -156,8 +157,8 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
 typedef void painter(const kind_of *k, const textiles_tile *tile, int index, int size, int x, int y,
                      uint8_t rgba[4]);
 
-/* Smooth pictures, a different one for each tile. */
-static void paint_waves(const kind_of *k, const textiles_tile *tile, int index, int size, int x, int y,
+/* Smooth pictures, a different one for each tile; alpha varies like the colours. */
+static void paint_glass(const kind_of *k, const textiles_tile *tile, int index, int size, int x, int y,
                         uint8_t rgba[4]) {
     (void)k;
     (void)tile;
@@ -168,6 +169,13 @@ static void paint_waves(const kind_of *k, const textiles_tile *tile, int index, 
         const double b = (double)(h >> 14 & 15) / 40 - 0.2;
         rgba[c] = (uint8_t)(128.5 + 120 * sin(phase + a * x + b * y));
     }
+}
+
+/* The same, opaque. */
+static void paint_waves(const kind_of *k, const textiles_tile *tile, int index, int size, int x, int y,
+                        uint8_t rgba[4]) {
+    paint_glass(k, tile, index, size, x, y, rgba);
+    rgba[3] = 255;
 }
 
 /* Each edge's colour from the middle of the tile to the edge, and at the corners discs that all tiles
@@ -234,18 +242,39 @@ static textiles_set *import(const kind_of *k, int size, painter *paint) {
 
 /* ---- rendering ------------------------------------------------------------------------ */
 
+/* what a texture holds: bytes; floats, which drivers filter exactly; floats with colour multiplied
+   by alpha */
+typedef enum texels { BYTES, FLOATS, PREMULTIPLIED, TEXELS } texels;
+
 /* a set, drawn and uploaded */
 typedef struct scene {
     textiles_set *set;
     textiles_plane plane;
     textiles_layout layout;
     txm_image atlas;
+    texels stored;
     GLuint texture, table;
 } scene;
 
-/* levels: of the mip-map, 0 = none. floats: as floats, which drivers filter exactly. */
+/* to colour multiplied by alpha, 0..1 */
+static void premultiply(const uint8_t rgba[4], float to[4]) {
+    const float alpha = (float)rgba[3] / 255;
+    for (int c = 0; c < 3; c++) to[c] = (float)rgba[c] / 255 * alpha;
+    to[3] = alpha;
+}
+
+/* The atlas as floats; the caller frees them. */
+static float *multiplied_atlas(const scene *s) {
+    const size_t count = (size_t)s->layout.width * (size_t)s->layout.height;
+    const uint8_t *pixels = s->atlas.pixels;
+    float *to = need(malloc(count * 4 * sizeof *to), "memory");
+    for (size_t i = 0; i < count; i++) premultiply(pixels + 4 * i, to + 4 * i);
+    return to;
+}
+
+/* levels: of the mip-map, 0 = none */
 static scene open_scene(const kind_of *k, int size, painter *paint, textiles_packing packing,
-                        int gutter, int levels, int floats) {
+                        int gutter, int levels, texels stored) {
     scene s;
     txm_env env = {0};
     memset(&s, 0, sizeof s);
@@ -261,16 +290,20 @@ static scene open_scene(const kind_of *k, int size, painter *paint, textiles_pac
 
     const GLenum target = packing == TEXTILES_SLICES ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D;
     const GLint wrap = packing == TEXTILES_TORUS ? GL_REPEAT : GL_CLAMP_TO_EDGE;
-    const GLint format = floats ? GL_RGBA32F : GL_RGBA8;
+    const GLint format = stored == BYTES ? GL_RGBA8 : GL_RGBA32F;
+    const GLenum type = stored == PREMULTIPLIED ? GL_FLOAT : GL_UNSIGNED_BYTE;
+    float *multiplied = stored == PREMULTIPLIED ? multiplied_atlas(&s) : NULL;
+    const void *pixels = multiplied ? (const void *)multiplied : s.atlas.pixels;
+    s.stored = stored;
     glActiveTexture(packing == TEXTILES_SLICES ? GL_TEXTURE1 : GL_TEXTURE0);
     glGenTextures(1, &s.texture);
     glBindTexture(target, s.texture);
     if (packing == TEXTILES_SLICES)
         glTexImage3D(target, 0, format, l->pitch_x, l->pitch_y, l->count, 0, GL_RGBA,
-                     GL_UNSIGNED_BYTE, s.atlas.pixels);
+                     type, pixels);
     else
-        glTexImage2D(target, 0, format, l->width, l->height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
-                     s.atlas.pixels);
+        glTexImage2D(target, 0, format, l->width, l->height, 0, GL_RGBA, type, pixels);
+    free(multiplied);
     glTexParameteri(target, GL_TEXTURE_WRAP_S, wrap);
     glTexParameteri(target, GL_TEXTURE_WRAP_T, wrap);
     glTexParameteri(target, GL_TEXTURE_MAX_LEVEL, levels);
@@ -352,7 +385,18 @@ static void probe(const scene *s, double x, double y, uint8_t rgba[4]) {
 
 /* ---- lookups -------------------------------------------------------------------------- */
 
-/* the share of pixels at which all channels agree within one step */
+/* Do all channels of a rendered pixel agree with what was drawn? Straight colour was rounded to whole
+   steps before it is multiplied here, and so was its alpha. */
+static int agrees(const scene *s, const float rgba[4], const uint8_t want[4]) {
+    const float limit = s->stored == PREMULTIPLIED ? 1.5f : 1.001f;
+    float w[4] = {want[0] / 255.0f, want[1] / 255.0f, want[2] / 255.0f, want[3] / 255.0f};
+    if (s->stored == PREMULTIPLIED) premultiply(want, w);
+    int same = 1;
+    for (int c = 0; c < 4; c++) same &= fabsf(rgba[c] - 255 * w[c]) <= limit;
+    return same;
+}
+
+/* the share of pixels that agree */
 static double compare(GLuint program, const scene *s, const view *v, int upright, float *rgba) {
     static uint8_t want[VIEW * VIEW * 4];
     const int n = s->layout.size, triangle = s->plane.kind == TEXTILES_TRIANGLE;
@@ -377,12 +421,7 @@ static double compare(GLuint program, const scene *s, const view *v, int upright
     }
     render(program, s, v, rgba);
     int same = 0;
-    for (int b = 0; b < VIEW * VIEW; b++) {
-        int near = 1;
-        for (int c = 0; c < 4; c++)
-            near &= fabsf(rgba[4 * b + c] - (float)want[4 * b + c]) <= 1.001f;
-        same += near;
-    }
+    for (int b = 0; b < VIEW * VIEW; b++) same += agrees(s, rgba + 4 * b, want + 4 * b);
     return same / (double)(VIEW * VIEW);
 }
 
@@ -402,20 +441,23 @@ static void test_lookups(GLuint program, float *rgba) {
             const kind_of *k = &kinds[i];
             if (p == TEXTILES_TORUS && k->kind == TEXTILES_TRIANGLE) continue;
             const int gutter = p == TEXTILES_TORUS ? 0 : i % 2 ? 8 : 1;
-            double least[2] = {1, 1};
-            for (int floats = 0; floats < 2; floats++) {
-                scene s = open_scene(k, 32, paint_waves, (textiles_packing)p, gutter, 0, floats);
+            double least[TEXELS] = {1, 1, 1};
+            for (int stored = 0; stored < TEXELS; stored++) {
+                painter *paint = stored == PREMULTIPLIED ? paint_glass : paint_waves;
+                scene s = open_scene(k, 32, paint, (textiles_packing)p, gutter, 0, (texels)stored);
                 for (int v = 0; v < VIEWS; v++) {
                     const double share = compare(program, &s, &views[v], v < UPRIGHT, rgba);
-                    if (share < least[floats]) least[floats] = share;
+                    if (share < least[stored]) least[stored] = share;
                 }
                 close_scene(&s);
             }
             char what[120], figures[120];
             snprintf(what, sizeof what, "%s, %s: the shader shows the plane", k->name, packings[p]);
-            snprintf(figures, sizeof figures, "%.3f %% of the pixels, %.3f %% filtered in 8 bits",
-                     100 * least[1], 100 * least[0]);
-            report(least[1] >= 0.999 && least[0] >= 0.999, what, figures);
+            snprintf(figures, sizeof figures,
+                     "%.3f %% of the pixels, %.3f %% filtered in 8 bits, %.3f %% translucent",
+                     100 * least[FLOATS], 100 * least[BYTES], 100 * least[PREMULTIPLIED]);
+            report(least[FLOATS] >= 0.999 && least[BYTES] >= 0.999 && least[PREMULTIPLIED] >= 0.999,
+                   what, figures);
         }
     }
 }
@@ -492,7 +534,7 @@ static void test_mipmaps(GLuint program, float *rgba) {
             if (p == TEXTILES_TORUS && k->kind == TEXTILES_TRIANGLE) continue;
             for (int levels = 1; levels <= 3; levels += 2) {
                 const int gutter = p == TEXTILES_TORUS ? 0 : 1 << levels;
-                scene s = open_scene(k, 128, paint_plain, (textiles_packing)p, gutter, levels, 0);
+                scene s = open_scene(k, 128, paint_plain, (textiles_packing)p, gutter, levels, BYTES);
                 int judged = 0, joints = 0, foreign = 0;
                 for (int level = 0; level <= levels; level++)
                     judge(program, &s, level, levels, rgba, &judged, &joints, &foreign);
@@ -506,7 +548,7 @@ static void test_mipmaps(GLuint program, float *rgba) {
             }
         }
         /* without a gutter the same test finds foreign colours */
-        scene s = open_scene(k, 128, paint_plain, TEXTILES_PACKED, 0, 3, 0);
+        scene s = open_scene(k, 128, paint_plain, TEXTILES_PACKED, 0, 3, BYTES);
         int judged = 0, joints = 0, foreign = 0;
         for (int level = 0; level <= 3; level++)
             judge(program, &s, level, 3, rgba, &judged, &joints, &foreign);
@@ -554,7 +596,7 @@ static void test_levels(GLuint program, float *rgba) {
         const kind_of *k = &kinds[i];
         for (int p = 0; p < 3; p++) {
             if (k->variants > 1 || (p == TEXTILES_TORUS && k->kind == TEXTILES_TRIANGLE)) continue;
-            scene s = open_scene(k, 64, paint_plain, (textiles_packing)p, -1 + (p == 1), 3, 1);
+            scene s = open_scene(k, 64, paint_plain, (textiles_packing)p, -1 + (p == 1), 3, FLOATS);
             const int slices = p == TEXTILES_SLICES, triangle = k->kind == TEXTILES_TRIANGLE;
             const int width = s.layout.pitch_x, depth = s.layout.count;
             for (int level = 0; level <= 3; level++) {
