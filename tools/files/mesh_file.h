@@ -69,6 +69,12 @@ int builder_triangulate(builder *b);
 /* The lists as a mesh. */
 int builder_finish(builder *b);
 
+/* ---- polygons to triangles: mesh_polygon.c ----------------------------------------------- */
+
+/* Add the triangles of a polygon. Convex ones become fans; from others ears are cut off while there
+   are any. */
+int polygon_triangulate(builder *b, const corner *p, size_t n);
+
 /* ---- text: mesh_text.c ------------------------------------------------------------------- */
 
 typedef struct text {
