@@ -181,25 +181,121 @@ static void obj_says_what_is_wrong(void **state) {
     const char *range = "line 2: a face with an index that is out of range or no number";
     assert_fails("", "the file is empty");
     assert_fails("hello\nworld", "no vertices in it; give an OBJ or PLY file");
+    assert_fails("\xff\xfev", "its text is in UTF-16; save it in UTF-8");
     assert_fails("v 0 0 0\n", "no faces in it");
     assert_fails("v 0 0\n", "line 1: a vertex has less than three coordinates");
-    assert_fails("\n\nv 0 0 nan\n", "line 3: a coordinate is not a finite number");
-    assert_fails("v 0 -inf 0\n", "line 1: a coordinate is not a finite number");
-    assert_fails("v 0 1e39 0\n", "line 1: a coordinate is not a finite number");
+    assert_fails("\n\nv 0 0 nan\nf 1 1 1",
+                 "line 3: vertex 1 has a coordinate that is not a finite number");
+    assert_fails("v 0 0 0\nv 0 -inf 0\nf 2 2 2\n",
+                 "line 2: vertex 2 has a coordinate that is not a finite number");
+    assert_fails("v 0 1e101 0\nf 1 1 1",
+                 "line 1: vertex 1 has a coordinate that is not a finite number");
+    assert_fails("v 0 0 0\nv 1e39 0 0\nv 1 0x1 0", "line 3: a coordinate is not a number");
+    assert_fails("v 0 0 1,5.2\n", "line 1: a coordinate is not a number");
+    assert_fails("v 0 0 1,5,2\n", "line 1: a coordinate is not a number");
     assert_fails("v 0 x 0\n", "line 1: a coordinate is not a number");
     assert_fails("v 0 1- 0\n", "line 1: a coordinate is not a number");
     assert_fails("v 0 0 0 nan 0 0\n", "line 1: a color is not a finite number");
-    assert_fails("vt nan 0\n", "line 1: a texture coordinate is not a finite number");
+    assert_fails("vt x 0\n", "line 1: a texture coordinate is not a number");
     assert_fails("v 0 0 0\nf 0 1 1\n", range);
     assert_fails("v 0 0 0\nf -2 1 1\n", range);
     assert_fails("v 0 0 0\nf 1 1 99999999999999999999\n", range);
     assert_fails("v 0 0 0\nf 1 1 1/x\n", range);
     assert_fails("v 0 0 0\nf 1 1 1/1/1/1\n", range);
-    assert_fails("v 0 0 0\nf 1 1\n", "line 2: a face with less than three corners");
+    assert_fails("v 0 0 0\nf 1 1\n", "no faces in it");
     assert_fails("v 0 0 0 \\\n\nf 1 1 2", "line 3: a face with vertex 2, but there are only 1");
     assert_fails("v 0 0 0\nf 1/1 1/1 1/1",
                  "line 2: a face with texture vertex 1, but there are only 0");
     assert_fails("glTFxxxx", "glTF is only written, not read; convert it to OBJ or PLY");
+}
+
+/* What other programs write, and what does no harm, is read and told in one line. */
+static void text_as_people_have_it(void **state) {
+    (void)state;
+    static const char *const same[] = {
+        "v 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2 3\n",
+        "\xef\xbb\xbfv 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2 3\n",
+        "# a\rv 0 0 0\rv 1.5 0 0\rv 0 25 0\rf 1 2 3\r",
+        "v 0 0 0\r\nv 1.5 \\\r\n0 0\r\nv 0 25 0\r\nf 1 2\\  \r\n 3",
+        "# C:\\\nv 0 0 0\no a\\\nv 1.5 0 0 # \\\nv 0 25 0\nusemtl \\\nf 1 2 3 # \\\nfoo\\\n",
+        "mtllib b\\\rv 0 0 0\rg\\\rv 1.5 0 0\rv 0 25 0\rf 1 2 3",
+        "v 0 0D0 0.\nv 1.5D+00 0 0.d0\nv 0 2.5d1 0\nf 1 2 3\n",
+        "v 0 0 0\nv 1,5 0 0,0\nv 0 25 0\nf 1 2 3\n",
+        "v 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2\nf 3\nf 1 2 3\nf\n",
+        "v 0 0 0\nv 1.5 0 0\nv 0 25 0\nv nan 0 inf\nv -1.#IND -nan(ind) 1.#QNAN\nf 1 2 3\n",
+        "v 0 0 0\nv 1.5 0 0\nv 0 25 0\nvt nan 0\nvt -1.#IND 1\nf 1/2 2/1 3/1\n"};
+    static const char *const notes[] = {
+        "", "", "", "", "", "", "", "commas in numbers were taken for decimal points",
+        "left out: faces with less than three corners (3)",
+        "left out: unused vertices that are not finite (2)",
+        "left out: texture coordinates that are not finite (2)"};
+    const float positions[] = {0, 0, 0, 1.5f, 0, 0, 0, 25, 0};
+    static const uint32_t indices[] = {0, 1, 2};
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++) {
+        mesh_data m;
+        read_text(same[i], &m);
+        assert_indices(&m, indices, 1);
+        assert_memory_equal(m.positions, positions, sizeof positions);
+        assert_string_equal(m.note, notes[i]);
+        assert_null(m.uvs);
+        mesh_free(&m);
+    }
+}
+
+/* A mesh far from zero has the shape that it has there; so has one that is very large or small. */
+static void a_place_keeps_the_shape(void **state) {
+    (void)state;
+    const double places[][4] = {{455000.25, 5400000.125, 210.5, 1},
+                                {-1e9, 1e9, 0, 1},
+                                {0, 0, 0, 1e-30},
+                                {0, 0, 0, 1e25},
+                                {1e40, 0, 0, 1e36},
+                                {3e-20, 0, 0, 1e-24}};
+    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
+        const double *o = places[i], scale = o[3];
+        const char *extensions[] = {".obj", ".ply"};
+        char text[400];
+        mesh_data m;
+        snprintf(text, sizeof text,
+                 "v 0 0 0\nv %.17g %.17g %.17g\nv %.17g %.17g %.17g\nv %.17g %.17g %.17g\nf 2 3 4\n",
+                 o[0], o[1], o[2], o[0] + scale, o[1], o[2], o[0], o[1] + scale, o[2] + scale / 4);
+        read_text(text, &m);
+        for (int pass = 0; pass < 2; pass++) {
+            mesh_scene scene = {0};
+            unsigned char *out;
+            size_t size;
+            const char *why;
+            const double s = mesh_place_scale(&m.place) / scale;
+            const float *p = m.positions + 3; /* of the first that is used */
+            assert_float_equal(s * ((double)p[3] - (double)p[0]), 1, 1e-6);
+            assert_float_equal(s * ((double)p[7] - (double)p[1]), 1, 1e-6);
+            assert_float_equal(s * ((double)p[8] - (double)p[2]), 0.25, 1e-6);
+            for (int k = 0; k < 3; k++)
+                assert_float_equal((mesh_place_out(&m.place, p[k], k) - o[k]) / scale, 0, 1e-6);
+            scene.surface = &m;
+            scene.place = m.place;
+            assert_true(mesh_encode(extensions[pass], &scene, &out, &size, &why));
+            mesh_free(&m);
+            assert_true(decode(out, size, 0, &m, &why));
+            free(out);
+        }
+        mesh_free(&m);
+    }
+}
+
+static void lines_lie_with_the_mesh(void **state) {
+    (void)state;
+    const char *text = "v 455000.5 5400000 210\nv 455001 5400000.25 210\nv 455000 5400001 210\nf 1 2 3\n"
+                       "l 1 \\\n 2\n";
+    mesh_data m;
+    mesh_lines lines;
+    const char *why;
+    read_text(text, &m);
+    assert_true(mesh_decode_lines((const unsigned char *)text, strlen(text), &m.place, &lines, &why));
+    assert_int_equal(lines.count, 1);
+    assert_memory_equal(lines.points, m.positions, 6 * sizeof(float));
+    mesh_lines_free(&lines);
+    mesh_free(&m);
 }
 
 /* ---- PLY ----------------------------------------------------------------------------------- */
@@ -302,6 +398,46 @@ static void ply_of_all_formats_and_types(void **state) {
     }
 }
 
+/* Line ends and blanks of headers, 64 bits, strips. */
+static void ply_as_people_have_it(void **state) {
+    (void)state;
+    static const char body[] = "\n\0\0\0\0\0\0\0"; /* begins with a line end that is none */
+    static const char *const ends[] = {"\n", "\r\n", "\r", " \n", "\t \r\n", "  \r"};
+    for (size_t e = 0; e < sizeof ends / sizeof ends[0]; e++) {
+        static bytes b;
+        const char *lines[] = {"ply", "format  binary_little_endian 1.0", "element vertex 11",
+                               "property uchar x", "property uchar y", "property uchar z",
+                               "element face 1", "property list uchar int64 vertex_indices",
+                               "element tristrips 1", "property list int int vertex_indices",
+                               "end_header"};
+        static const double strip[] = {0, 1, 2, 3, -1, 4, 5, 6, 6, 7};
+        static const uint32_t indices[] = {10, 2, 3, 0, 1, 2, 2, 1, 3, 4, 5, 6};
+        mesh_data m;
+        const char *why;
+        b.size = 0;
+        b.format = 1;
+        for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+            add_text(&b, lines[i]);
+            add_text(&b, ends[e]);
+        }
+        memcpy(b.data + b.size, body, 8);
+        b.size += 8;
+        for (int i = 8; i < 33; i++) add_value(&b, 1, i);
+        add_value(&b, 1, 3);
+        for (int i = 0; i < 3; i++) {
+            add_value(&b, 5, indices[i]);
+            add_value(&b, 5, 0);
+        }
+        add_value(&b, 4, 10);
+        for (int i = 0; i < 10; i++) add_value(&b, 4, strip[i]);
+        if (!decode(b.data, b.size, 0, &m, &why)) fail_msg("%d: %s", (int)e, why);
+        assert_indices(&m, indices, 4);
+        assert_float_equal(m.positions[0], 10, 0);
+        assert_float_equal(m.positions[32], 32, 0);
+        mesh_free(&m);
+    }
+}
+
 static void ply_cut_short_is_refused(void **state) {
     (void)state;
     static bytes b;
@@ -365,13 +501,16 @@ static void ply_says_what_is_wrong(void **state) {
                  early);
     assert_fails(PLY "element vertex 1\n" XYZ "end_header\n1 2 x\n", "line 8: not a number");
     assert_fails(PLY "element vertex 1\n" XYZ "end_header\n1 2 nan\n",
-                 "vertex 0 has a number that is not finite");
+                 "no faces in it");
 #define FACE PLY "element vertex 1\n" XYZ "element face 1\nproperty list int int vertex_index\n" \
              "end_header\n1 2 3\n"
     assert_fails(FACE "3 0 0 1", "line 11: a face with vertex 2, but there are only 1");
-    assert_fails(FACE "3 0 0 -1", "line 11: face 0 has an index that is out of range");
-    assert_fails(FACE "3 0 0 0.5", "line 11: face 0 has an index that is out of range");
-    assert_fails(FACE "2 0 0", "line 11: face 0 has less than three corners");
+    assert_fails(FACE "3 0 0 -1", "line 11: a face with an index that is out of range");
+    assert_fails(FACE "3 0 0 0.5", "line 11: a face with an index that is out of range");
+    assert_fails(FACE "2 0 0", "no faces in it");
+    assert_fails(PLY "element vertex 1\n" XYZ "element face 1\nproperty list int int "
+                 "vertex_index\nend_header\n1 nan 3\n3 0 0 0",
+                 "line 10: vertex 1 has a coordinate that is not a finite number");
     assert_fails(FACE "2000000000 0 0",
                  "line 11: a list is longer than the file; get a whole copy");
     assert_fails(FACE "-1 0 0", "line 11: a list is longer than the file; get a whole copy");
@@ -635,6 +774,10 @@ int main(void) {
         cmocka_unit_test(obj_reads_what_others_write),
         cmocka_unit_test(obj_colors),
         cmocka_unit_test(polygons_become_triangles),
+        cmocka_unit_test(text_as_people_have_it),
+        cmocka_unit_test(a_place_keeps_the_shape),
+        cmocka_unit_test(lines_lie_with_the_mesh),
+        cmocka_unit_test(ply_as_people_have_it),
         cmocka_unit_test(obj_numbers_are_rounded_as_strtod_does),
         cmocka_unit_test(obj_says_what_is_wrong),
         cmocka_unit_test(ply_of_all_formats_and_types),

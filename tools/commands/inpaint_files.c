@@ -26,6 +26,7 @@ static int read_mesh(inpaint_job *j) {
     const char *why;
     if (!mesh_read(j->mesh_path, 0, &j->mesh, &why))
         return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", j->mesh_path, why);
+    if (j->mesh.note[0]) cli_warn(&j->run, "'%s': %s", j->mesh_path, j->mesh.note);
     if (!j->mesh.uvs)
         return cli_fail(&j->run, CLI_FAILED, "'%s' has no texture coordinates", j->mesh_path);
     const size_t corners = 3 * j->mesh.triangle_count;

@@ -11,8 +11,9 @@
 
 /* ---- JSON ------------------------------------------------------------------------------------ */
 
-/* The points of a line, `dimensions` numbers each, to `to`. 0: one of them is none. */
-static int get_points(const cJSON *list, int dimensions, float *to) {
+/* The points of a line, `dimensions` numbers each, relative to the mesh's place, to `to`. 0: one of them
+   is none. */
+static int get_points(const cJSON *list, int dimensions, const mesh_place *place, float *to) {
     const cJSON *point, *number;
     size_t at = 0; /* in to: 3 numbers a point */
     cJSON_ArrayForEach(point, list) {
@@ -21,7 +22,8 @@ static int get_points(const cJSON *list, int dimensions, float *to) {
         to[at + 2] = 0;
         cJSON_ArrayForEach(number, point) {
             if (!cJSON_IsNumber(number) || !(fabs(number->valuedouble) <= MAX_COORDINATE)) return 0;
-            to[at + k++] = (float)number->valuedouble;
+            to[at + k] = mesh_place_in(place, number->valuedouble, (int)k);
+            if (!txm_is_finite((double)to[at + k++])) return 0;
         }
         at += 3;
     }
@@ -52,7 +54,7 @@ static int take_json(inpaint_job *j, const cJSON *json, int dimensions, char why
         const cJSON *list = cJSON_GetObjectItemCaseSensitive(line, "points");
         float *to = j->drawn.points + 3 * points;
         const int n = cJSON_GetArraySize(list);
-        if (!cJSON_IsArray(list) || n < 2 || !get_points(list, dimensions, to)) {
+        if (!cJSON_IsArray(list) || n < 2 || !get_points(list, dimensions, &j->mesh.place, to)) {
             snprintf(why, 120, "stroke %lu: \"points\" must be a list of 2 or more %s",
                      (unsigned long)j->drawn.count, dimensions == 2 ? "[x,y]" : "[x,y,z]");
             return 0;
@@ -75,7 +77,7 @@ static int decode(inpaint_job *j, const unsigned char *bytes, size_t size, char 
     while (at < size && (bytes[at] == ' ' || bytes[at] == '\t' || bytes[at] == '\n' || bytes[at] == '\r'))
         at++;
     if (on_mesh && (at == size || bytes[at] != '{')) {
-        const int ok = mesh_decode_lines(bytes, size, &j->drawn, &text);
+        const int ok = mesh_decode_lines(bytes, size, &j->mesh.place, &j->drawn, &text);
         if (!ok) snprintf(why, 120, "%s", text);
         return ok;
     }

@@ -88,8 +88,8 @@ static double angle_of(double a, double b, double c) {
     return acos(x < -1 ? -1 : x > 1 ? 1 : x) * 180 / 3.14159265358979;
 }
 
-/* Measure the mesh for --stats; returns the mean quality and the share of valence 6. */
-int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r,
+/* Measure the mesh for --stats, lengths times scale; returns the mean quality and the share of valence 6. */
+int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, double scale,
                  double *mean_quality, double *valence_6) {
     spread edges = {0, 0, 0}, areas = {0, 0, 0}, qualities = {0, 0, 0};
     double least_quality = 1, least_angle = 180;
@@ -132,7 +132,7 @@ int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r,
     cli_figure(run, "loops", (double)f.loops);
     cli_figures(run, "mended", mended, 7);
     cli_figure(run, "crease_edges", (double)r->crease_edges);
-    cli_figure(run, "edge_length", m->edge_length);
+    cli_figure(run, "edge_length", m->edge_length * scale);
     cli_figure(run, "quality", *mean_quality);
     cli_figure(run, "quality_least", least_quality);
     cli_figure(run, "valence_6", *valence_6);

@@ -67,10 +67,12 @@ static int check_options(retile_job *j, const char *method) {
 
 /* ---- reading ------------------------------------------------------------------------------- */
 
-static int read_mesh(retile_job *j, const char *path, int points_too, mesh_data *mesh) {
+static int read_mesh(retile_job *j, const char *path, int flags, mesh_data *mesh) {
     const char *why;
-    if (mesh_read(path, points_too, mesh, &why)) return CLI_DONE;
-    return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
+    if (!mesh_read(path, flags, mesh, &why))
+        return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
+    if (mesh->note[0]) cli_warn(&j->run, "'%s': %s", path, mesh->note);
+    return CLI_DONE;
 }
 
 /* Scales of edge lengths from a picture on the input's texture coordinates: 1 where it is black,
@@ -131,6 +133,7 @@ static int write_output(retile_job *j) {
     memset(&baked, 0, sizeof baked);
 
     scene.surface = &j->output;
+    scene.place = j->input.place;
     if (j->png) scene.texture = j->png_path[0] ? name_in(j->png_path) : "texture";
     if (is_glb) {
         scene.png = j->png;
@@ -247,12 +250,14 @@ static int run_job(retile_job *j, int argc, char **argv) {
 
     cli_stage(&j->run, "read");
     status = read_mesh(j, j->run.inputs[0], 0, &j->input);
-    if (!status && j->instances) status = read_mesh(j, j->instances, 1, &j->patch);
+    if (!status && j->instances) /* it lies on a triangle between 0 and 1 */
+        status = read_mesh(j, j->instances, MESH_POINTS | MESH_UNMOVED, &j->patch);
     if (!status) status = retile(j);
     if (!status) status = retile_dress(j);
     if (!status) {
         cli_stage(&j->run, "measure");
-        status = mesh_figures(&j->run, j->result, &j->report, &quality, &valence_6);
+        status = mesh_figures(&j->run, j->result, &j->report, mesh_place_scale(&j->input.place),
+                              &quality, &valence_6);
         if (j->instances) cli_figure(&j->run, "instances", (double)j->placed);
     }
     if (!status) {

@@ -54,8 +54,9 @@ int retile_place_instances(retile_job *j);
 
 /* ---- mesh_figures.c ---- */
 
-/* Measure the mesh for --stats; returns the mean quality and the share of valence 6. */
-int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, double *mean_quality,
-                 double *valence_6);
+/* Measure the mesh for --stats, lengths times scale; returns the mean quality and the share of
+   valence 6. */
+int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, double scale,
+                 double *mean_quality, double *valence_6);
 
 #endif /* RETILE_H */

@@ -7,34 +7,54 @@
 
 /* ---- reading ----------------------------------------------------------------------------- */
 
-int mesh_decode(const unsigned char *bytes, size_t size, int points_too, mesh_data *mesh,
+/* Is there this word, in whatever case, and behind it the end of a word? */
+static int starts_with(const text *in, const char *word) {
+    size_t n = 0;
+    for (; word[n]; n++) {
+        if ((size_t)(in->end - in->at) <= n || (in->at[n] | 32) != word[n]) return 0;
+    }
+    return text_at_word_end(in->at + n, in->end);
+}
+
+/* Text of two bytes a character, or of four. */
+static int is_wide_text(const unsigned char *bytes, size_t size) {
+    return size >= 2 && ((bytes[0] == 0xff && bytes[1] == 0xfe) ||
+                         (bytes[0] == 0xfe && bytes[1] == 0xff));
+}
+
+static int read_format(builder *b, const unsigned char *bytes, size_t size, int points_too) {
+    text in = text_of(bytes, size);
+    int ok;
+    if (size >= 4 && !memcmp(bytes, "glTF", 4))
+        return builder_fail(b, 0, "glTF is only written, not read; convert it to OBJ or PLY");
+    if (is_wide_text(bytes, size))
+        return builder_fail(b, 0, "its text is in UTF-16; save it in UTF-8");
+    if (starts_with(&in, "ply")) ok = mesh_read_ply(b, &in, points_too);
+    else ok = mesh_read_obj(b, &in);
+    b->commas = in.commas;
+    return ok;
+}
+
+int mesh_decode(const unsigned char *bytes, size_t size, int flags, mesh_data *mesh,
                 const char **why) {
     builder b;
-    text in;
-    int ok;
     memset(mesh, 0, sizeof *mesh);
     builder_init(&b, mesh, why);
+    b.unmoved = (flags & MESH_UNMOVED) != 0;
     if (size == 0) return builder_fail(&b, 0, "the file is empty");
-    in.at = (const char *)bytes;
-    in.end = in.at + size;
-    in.line = 1;
-    if (size >= 4 && !memcmp(bytes, "glTF", 4))
-        return builder_fail(&b, 0, "glTF is only written, not read; convert it to OBJ or PLY");
-    if (size >= 4 && !memcmp(bytes, "ply", 3) && (bytes[3] == '\n' || bytes[3] == '\r'))
-        ok = mesh_read_ply(&b, &in, points_too);
-    else ok = mesh_read_obj(&b, &in);
-    ok = ok && builder_triangulate(&b) && builder_finish(&b);
+    const int ok = read_format(&b, bytes, size, (flags & MESH_POINTS) != 0) &&
+                   builder_triangulate(&b) && builder_finish(&b);
     if (!ok) mesh_free(mesh);
     builder_free(&b);
     return ok;
 }
 
-int mesh_read(const char *path, int points_too, mesh_data *mesh, const char **why) {
+int mesh_read(const char *path, int flags, mesh_data *mesh, const char **why) {
     size_t size;
     unsigned char *bytes = file_read(path, &size);
     memset(mesh, 0, sizeof *mesh);
     if (!bytes) return *why = strerror(errno), 0;
-    const int ok = mesh_decode(bytes, size, points_too, mesh, why);
+    const int ok = mesh_decode(bytes, size, flags, mesh, why);
     free(bytes);
     return ok;
 }
@@ -90,7 +110,8 @@ int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **
     if (!is_glb && !scene_part_count(scene)) return *why = "there is no surface to write", 0;
     int ok;
     if (is_glb) ok = mesh_write_glb(scene, &s);
-    else if (!strcmp(extension, ".ply")) ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &s);
+    else if (!strcmp(extension, ".ply")) 
+        ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &scene->place, &s);
     else ok = mesh_write_obj(scene, &s);
     if (!ok) s.failed = 1;
     return sink_finish(&s, bytes, size, why);

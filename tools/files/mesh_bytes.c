@@ -83,6 +83,15 @@ void sink_floats(sink *s, const float *v, size_t n) {
     }
 }
 
+void sink_doubles(sink *s, const double *v, size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        uint64_t bits;
+        memcpy(&bits, &v[i], 8);
+        sink_u32(s, (uint32_t)(bits & 0xffffffffu));
+        sink_u32(s, (uint32_t)(bits >> 32));
+    }
+}
+
 int sink_finish(sink *s, unsigned char **bytes, size_t *size, const char **why) {
     *bytes = NULL;
     if (s->failed) {

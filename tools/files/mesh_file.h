@@ -8,7 +8,7 @@
 
 #include "mesh_io.h"
 
-static const uint32_t NO_UV = 0xffffffffu;
+static const uint32_t NO_UV = 0xffffffffu, NO_VERTEX = 0xffffffffu;
 
 /* In memory v runs downwards, in OBJ and PLY files upwards; converts either way. */
 static inline float turn_v(float v) {
@@ -42,11 +42,24 @@ typedef struct polygon {
     size_t first, count, line; /* its corners; line of the file */
 } polygon;
 
+/* What is left out and counted, as it does no harm. */
+enum { LEFT_FACES, LEFT_VERTICES, LEFT_UVS, LEFT_NORMALS, LEFT_KINDS };
+
+/* A position that is not finite. */
+typedef struct bad_position {
+    size_t vertex, line; /* line of the file, or 0 */
+} bad_position;
+
 typedef struct builder {
-    list positions, normals, rotations, colors, uvs; /* 3, 3, 4 floats, 4 bytes, 2 floats */
+    list positions; /* 3 doubles, which need not be finite where nothing uses them        */
+    list normals, rotations, colors, uvs; /* 3, 4 floats, 4 bytes, 2 floats; uvs likewise */
     list corners, polygons;                          /* as they stand in the file         */
     list triangles;                                  /* 3 corners each                    */
     list flat, around;                               /* scratch of triangulate            */
+    list bad;                    /* lines of positions that are not finite, in their order */
+    size_t left_out[LEFT_KINDS]; /* how many of each                                       */
+    size_t commas;               /* decimal commas                                         */
+    int unmoved;                 /* positions stay where they are                          */
     mesh_data *mesh;
     const char **why;
 } builder;
@@ -62,6 +75,27 @@ int builder_fail(const builder *b, size_t line, const char *format, ...)
     ;
 
 int builder_fail_memory(const builder *b);
+
+/* Note where the last position of the list stands in the file, if it is not finite. 0: no memory. */
+int builder_check_position(builder *b, size_t vertex, size_t line);
+
+/* The corners from the first one on are a polygon, which begins in that line of the file (0: not
+   known). With less than three corners it is left out. 0: no memory. */
+int builder_add_polygon(builder *b, size_t first, size_t line);
+
+/* A strip of triangles: each vertex makes one with the two before it, every second one turned. */
+typedef struct strip {
+    uint32_t last[2];
+    size_t count; /* of vertices so far */
+} strip;
+
+static inline strip strip_begin(void) {
+    const strip s = {{0, 0}, 0};
+    return s;
+}
+
+/* The next vertex; triangles of two equal ones only join strips and are dropped. 0: no memory. */
+int strip_add(builder *b, strip *s, uint32_t vertex);
 
 /* Check what the polygons refer to, now that all of the file is known, and make triangles. */
 int builder_triangulate(builder *b);
@@ -79,29 +113,46 @@ int polygon_triangulate(builder *b, const corner *p, size_t n);
 
 typedef struct text {
     const char *at, *end;
-    size_t line; /* from 1 */
+    size_t line;   /* from 1                                                       */
+    int joins;     /* a backslash at the end of a line joins the next one on, as in OBJ files */
+    size_t commas; /* numbers so far with a decimal comma                          */
 } text;
 
+/* From the beginning, behind a byte order mark. */
+text text_of(const void *bytes, size_t size);
+
 static inline int is_blank(char c) {
-    return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+    return c == ' ' || c == '\t' || c == '\v' || c == '\f';
+}
+
+/* Lines end in \n, \r\n or \r. */
+static inline int is_line_end(char c) {
+    return c == '\n' || c == '\r';
 }
 
 static inline int is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
-/* To the next word of this line; a backslash at the end of a line joins the next one on. */
+/* To the next word of this line, across joined lines. */
 void text_skip_blanks(text *in);
 
-/* To the beginning of the next line. */
+/* Over the end of a line, at which the text stands. */
+void text_end_line(text *in);
+
+/* To the beginning of the next line; nothing is joined on. */
 void text_skip_line(text *in);
+
+/* The same behind all lines that are joined on; those of a comment are not. */
+void text_skip_rest(text *in);
 
 /* To the next word, on whichever line. */
 void text_skip_space(text *in);
 
 int text_at_word_end(const char *p, const char *end);
 
-/* The number that begins here, correctly rounded to double; 0: there is none. */
+/* The number that begins here, correctly rounded to double, which may be infinite or no number (nan,
+   -1.#IND); exponents may have a D for the E, and a decimal comma is counted; 0: there is none. */
 int text_number(text *in, double *value);
 
 /* The same for a number that must be finite as a float. */
@@ -129,9 +180,21 @@ void sink_print(sink *s, const char *format, ...)
 void sink_u16(sink *s, uint32_t v);
 void sink_u32(sink *s, uint32_t v);
 void sink_floats(sink *s, const float *v, size_t n);
+void sink_doubles(sink *s, const double *v, size_t n);
 
 /* Its bytes for free(). */
 int sink_finish(sink *s, unsigned char **bytes, size_t *size, const char **why);
+
+/* ---- where a mesh lies: mesh_place.c ----------------------------------------------------- */
+
+/* Choose the place of so many positions, 3 doubles each, those that is_used marks (NULL: all). */
+mesh_place place_choose(const double *positions, const unsigned char *is_used, size_t count);
+
+/* Can floats hold what lies at this place without its origin and scale? */
+int place_is_plain(const mesh_place *place);
+
+/* Digits of a coordinate in a text, so that floats come back. */
+int place_digits(const mesh_place *place, const mesh_data *m);
 
 /* ---- equal corners share a vertex: mesh_corners.c ---------------------------------------- */
 
@@ -176,7 +239,7 @@ mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own);
 int mesh_read_obj(builder *b, text *in);                  /* mesh_obj.c */
 int mesh_read_ply(builder *b, text *in, int points_too);  /* mesh_ply.c */
 int mesh_write_obj(const mesh_scene *scene, sink *s);
-int mesh_write_ply(const mesh_data *m, sink *s);
+int mesh_write_ply(const mesh_data *m, const mesh_place *place, sink *s);
 int mesh_write_glb(const mesh_scene *scene, sink *s);     /* mesh_glb.c */
 
 #endif /* MESH_FILE_H */

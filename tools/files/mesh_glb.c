@@ -12,6 +12,7 @@ typedef struct glb {
     sink binary, views, accessors, meshes, nodes;
     sink more; /* skins and animations, each after a comma */
     int view_count, accessor_count, mesh_count, node_count;
+    const mesh_place *place; /* of all nodes that have a mesh */
     const mesh_material *materials[MAX_MATERIALS]; /* NULL: plain white */
     int material_count;
 } glb;
@@ -178,6 +179,14 @@ static void glb_node(glb *g, const char *name) {
     if (name) sink_print(&g->nodes, "\"name\":\"%.60s\",", name);
 }
 
+/* Where the meshes lie: floats hold their shape, a node's numbers the place. */
+static void print_place(sink *s, const mesh_place *place) {
+    const double scale = mesh_place_scale(place), *o = place->origin;
+    if (o[0] != 0 || o[1] != 0 || o[2] != 0)
+        sink_print(s, "\"translation\":[%.17g,%.17g,%.17g],", o[0], o[1], o[2]);
+    if (scale != 1) sink_print(s, "\"scale\":[%.17g,%.17g,%.17g],", scale, scale, scale);
+}
+
 /* A node with copies of a mesh of their own. */
 static int glb_instances(glb *g, const mesh_instances *t) {
     sink *s = &g->nodes, *bin = &g->binary;
@@ -192,6 +201,7 @@ static int glb_instances(glb *g, const mesh_instances *t) {
     if (!glb_primitive(g, t->mesh, t->material)) return 0;
     glb_close_mesh(g);
     glb_node(g, t->name);
+    print_place(s, g->place);
     sink_print(s, "\"mesh\":%d,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{",
                g->mesh_count - 1);
     for (int k = 0, written = 0; k < 3; k++) {
@@ -403,6 +413,7 @@ static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
     if (scene_part_count(scene)) {
         glb_close_mesh(g);
         glb_node(g, k ? k->name : NULL);
+        if (!k) print_place(&g->nodes, g->place); /* a skin puts its mesh where the joints are */
         sink_print(&g->nodes, k ? "\"mesh\":0,\"skin\":0}" : "\"mesh\":0}");
     }
     for (int i = 0; i < scene->instance_count; i++) {
@@ -422,6 +433,7 @@ int mesh_write_glb(const mesh_scene *scene, sink *s) {
     sink json = sink_new();
     int instanced = 0;
     memset(&g, 0, sizeof g);
+    g.place = &scene->place;
     g.binary = g.views = g.accessors = g.meshes = g.nodes = g.more = sink_new();
     const int joint = glb_scene(&g, scene, &own);
     for (int i = 0; i < scene->instance_count; i++) instanced |= scene->instances[i].count > 0;

@@ -15,6 +15,28 @@
 
 #include "texmath.h"
 
+/* Where a mesh lies: in the file a position is origin + scale * that in memory. Floats have seven
+   digits; so readers take an origin away from coordinates that are large against the mesh's extent,
+   as those of maps are, and bring extents that are out of all proportion to 1 by a scale.       */
+typedef struct mesh_place {
+    double origin[3];
+    double scale; /* a power of two; 0 = 1 */
+} mesh_place;
+
+static inline double mesh_place_scale(const mesh_place *place) {
+    return place->scale > 0 ? place->scale : 1;
+}
+
+/* From memory to the file's coordinates. */
+static inline double mesh_place_out(const mesh_place *place, float value, int axis) {
+    return place->origin[axis] + mesh_place_scale(place) * (double)value;
+}
+
+/* From the file's coordinates to memory; it may become infinite. */
+static inline float mesh_place_in(const mesh_place *place, double value, int axis) {
+    return (float)((value - place->origin[axis]) / mesh_place_scale(place));
+}
+
 /* A triangle mesh, or a list of points. Readers fill in all fields; mesh_free releases it. */
 typedef struct mesh_data {
     size_t vertex_count, triangle_count; /* no triangles: a list of points                    */
@@ -27,7 +49,9 @@ typedef struct mesh_data {
     float *corner_normals;               /* 3 per corner, or NULL; mesh_crease makes them     */
     uint32_t *joints;                    /* 4 per vertex, into a mesh_skeleton, or NULL; only */
     float *weights;                      /* 4 per vertex, sum 1           GLB files hold them */
+    mesh_place place;                    /* of the positions                                  */
     char message[120];
+    char note[200]; /* of what a reader has left out or taken another way, in one line, or "" */
 } mesh_data;
 
 /* The mesh as the libraries take it. */
@@ -102,17 +126,24 @@ typedef struct mesh_scene {
     const unsigned char *png; /* GLB: the picture itself, to embed; NULL = refer to it by name  */
     size_t png_size;
     const char *library; /* OBJ: name of the file that mesh_encode_mtl makes; NULL = none       */
+    mesh_place place;    /* where all of it lies: GLB has it at nodes, OBJ and PLY in the numbers */
 } mesh_scene;
 
-/* Read the bytes of an OBJ or PLY file; the content decides which. Polygons become triangles. With
-   points_too a PLY without faces will do. 1 if all went well. */
-int mesh_decode(const unsigned char *bytes, size_t size, int points_too, mesh_data *mesh,
+enum {
+    MESH_POINTS = 1, /* a PLY without faces will do                                            */
+    MESH_UNMOVED = 2 /* the mesh keeps the place of its file, though floats may be too coarse  */
+};
+
+/* Read the bytes of a mesh file; the content decides which it is. Polygons become triangles. What
+   does no harm, such as faces of two corners, is left out and said in mesh->note. 1 if all went
+   well. Memory and time are in proportion to the size. */
+int mesh_decode(const unsigned char *bytes, size_t size, int flags, mesh_data *mesh,
                 const char **why);
 
 /* The same from a path. */
-int mesh_read(const char *path, int points_too, mesh_data *mesh, const char **why);
+int mesh_read(const char *path, int flags, mesh_data *mesh, const char **why);
 
-/* Release what the mesh owns; the message stays. */
+/* Release what the mesh owns; message and note stay. */
 void mesh_free(mesh_data *mesh);
 
 /* Polylines. */
@@ -123,8 +154,10 @@ typedef struct mesh_lines {
     char message[120];
 } mesh_lines;
 
-/* Read the polylines of the bytes of an OBJ file, its `l` elements. 1 if all went well. */
-int mesh_decode_lines(const unsigned char *bytes, size_t size, mesh_lines *lines, const char **why);
+/* Read the polylines of the bytes of an OBJ file, its `l` elements, relative to the place of the
+   mesh that they are on. 1 if all went well. */
+int mesh_decode_lines(const unsigned char *bytes, size_t size, const mesh_place *place,
+                      mesh_lines *lines, const char **why);
 
 /* Release what the lines own; the message stays. */
 void mesh_lines_free(mesh_lines *lines);

@@ -4,12 +4,17 @@
 
 /* ---- reading ----------------------------------------------------------------------------- */
 
+/* Behind the last word of this line? */
+static int at_end(const text *in) {
+    return in->at == in->end || is_line_end(*in->at) || *in->at == '#';
+}
+
 /* The numbers of the rest of the line, at most so many; -1 if one of them is none. */
 static int read_numbers(text *in, double *values, int most) {
     int n = 0;
     for (;;) {
         text_skip_blanks(in);
-        if (in->at == in->end || *in->at == '\n' || *in->at == '#' || n == most) return n;
+        if (at_end(in) || n == most) return n;
         if (!text_number(in, &values[n++])) return -1;
     }
 }
@@ -21,12 +26,10 @@ static int read_obj_vertex(builder *b, text *in, list *colors) {
     const int n = read_numbers(in, v, 7);
     if (n < 0) return builder_fail(b, line, "a coordinate is not a number");
     if (n < 3) return builder_fail(b, line, "a vertex has less than three coordinates");
-    float *p = (float *)list_add(&b->positions, 1);
+    double *p = (double *)list_add(&b->positions, 1);
     if (!p) return builder_fail_memory(b);
-    for (int k = 0; k < 3; k++) {
-        if (!text_to_float(v[k], &p[k]))
-            return builder_fail(b, line, "a coordinate is not a finite number");
-    }
+    memcpy(p, v, 3 * sizeof *p);
+    if (!builder_check_position(b, b->positions.count - 1, line)) return 0;
     if (n < 6) return 1;
     while (colors->count < b->positions.count) { /* white for those before that had none */
         float *c = (float *)list_add(colors, 1);
@@ -47,9 +50,9 @@ static int read_obj_uv(builder *b, text *in) {
     const int n = read_numbers(in, v, 3);
     float *uv = (float *)list_add(&b->uvs, 1);
     if (!uv) return builder_fail_memory(b);
-    uv[1] = 0;
-    if (n < 1 || !text_to_float(v[0], &uv[0]) || (n > 1 && !text_to_float(v[1], &uv[1])))
-        return builder_fail(b, line, "a texture coordinate is not a finite number");
+    if (n < 1) return builder_fail(b, line, "a texture coordinate is not a number");
+    uv[0] = (float)v[0];
+    uv[1] = n > 1 ? (float)v[1] : 0;
     return 1;
 }
 
@@ -74,7 +77,7 @@ static int read_obj_face(builder *b, text *in) {
     for (;;) {
         uint32_t vertex, uv = NO_UV, normal;
         text_skip_blanks(in);
-        if (in->at == in->end || *in->at == '\n' || *in->at == '#') break;
+        if (at_end(in)) break;
         int ok = read_obj_index(in, b->positions.count, &vertex);
         if (ok && in->at < in->end && *in->at == '/') {
             in->at++;
@@ -92,12 +95,7 @@ static int read_obj_face(builder *b, text *in) {
         c->vertex = vertex;
         c->uv = uv;
     }
-    polygon *f = (polygon *)list_add(&b->polygons, 1);
-    if (!f) return builder_fail_memory(b);
-    f->first = first;
-    f->count = b->corners.count - first;
-    f->line = line;
-    return f->count >= 3 ? 1 : builder_fail(b, line, "a face with less than three corners");
+    return builder_add_polygon(b, first, line);
 }
 
 /* Colors to bytes; all 0..1, or if any is above, all 0..255. */
@@ -119,18 +117,40 @@ static int obj_colors_to_bytes(builder *b, const list *colors) {
     return 1;
 }
 
+/* The first word of a line; returns its length. */
+static size_t read_obj_word(text *in, const char **word) {
+    text_skip_blanks(in);
+    *word = in->at;
+    while (!text_at_word_end(in->at, in->end)) in->at++;
+    return (size_t)(in->at - *word);
+}
+
+static int is_word(const char *word, size_t n, const char *other) {
+    return n == strlen(other) && !memcmp(word, other, n);
+}
+
+/* Only lines of these numbers are joined; a name or a comment may end in a backslash of its own. */
+static void skip_obj_line(text *in, const char *word, size_t n) {
+    static const char *const numbers[] = {"v", "vt", "vn", "vp", "f", "fo", "l", "p"};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        if (!is_word(word, n, numbers[i])) continue;
+        text_skip_rest(in);
+        return;
+    }
+    text_skip_line(in);
+}
+
 int mesh_read_obj(builder *b, text *in) {
     list colors = list_of(3 * sizeof(float));
     int ok = 1;
+    in->joins = 1;
     while (ok && in->at < in->end) {
-        text_skip_blanks(in);
-        const char *word = in->at;
-        while (!text_at_word_end(in->at, in->end)) in->at++;
-        const ptrdiff_t n = in->at - word;
-        if (n == 1 && word[0] == 'v') ok = read_obj_vertex(b, in, &colors);
-        else if (n == 2 && word[0] == 'v' && word[1] == 't') ok = read_obj_uv(b, in);
-        else if (n == 1 && word[0] == 'f') ok = read_obj_face(b, in);
-        if (ok) text_skip_line(in);
+        const char *word;
+        const size_t n = read_obj_word(in, &word);
+        if (is_word(word, n, "v")) ok = read_obj_vertex(b, in, &colors);
+        else if (is_word(word, n, "vt")) ok = read_obj_uv(b, in);
+        else if (is_word(word, n, "f") || is_word(word, n, "fo")) ok = read_obj_face(b, in);
+        if (ok) skip_obj_line(in, word, n);
     }
     ok = ok && obj_colors_to_bytes(b, &colors);
     list_free(&colors);
@@ -144,12 +164,13 @@ int mesh_read_obj(builder *b, text *in) {
 /* ---- reading lines ------------------------------------------------------------------------ */
 
 /* l v v v ..., or l v/vt v/vt ... */
-static int read_obj_line(builder *b, text *in, list *points, list *firsts) {
+static int read_obj_line(builder *b, text *in, const mesh_place *place, list *points,
+                         list *firsts) {
     const size_t line = in->line, before = points->count;
     for (;;) {
         uint32_t vertex, uv;
         text_skip_blanks(in);
-        if (in->at == in->end || *in->at == '\n' || *in->at == '#') break;
+        if (at_end(in)) break;
         int ok = read_obj_index(in, b->positions.count, &vertex) && vertex < b->positions.count;
         if (ok && in->at < in->end && *in->at == '/') {
             in->at++;
@@ -159,7 +180,12 @@ static int read_obj_line(builder *b, text *in, list *points, list *firsts) {
             return builder_fail(b, line, "a line with an index that is out of range or no number");
         float *p = (float *)list_add(points, 1);
         if (!p) return builder_fail_memory(b);
-        memcpy(p, (const float *)b->positions.items + 3 * (size_t)vertex, 3 * sizeof(float));
+        const double *from = (const double *)b->positions.items + 3 * (size_t)vertex;
+        for (int k = 0; k < 3; k++) {
+            p[k] = mesh_place_in(place, from[k], k);
+            if (!txm_is_finite((double)p[k]))
+                return builder_fail(b, line, "a line with a point that is not finite");
+        }
     }
     if (points->count < before + 2) return builder_fail(b, line, "a line with less than two points");
     size_t *first = (size_t *)list_add(firsts, 1);
@@ -168,27 +194,26 @@ static int read_obj_line(builder *b, text *in, list *points, list *firsts) {
     return 1;
 }
 
-int mesh_decode_lines(const unsigned char *bytes, size_t size, mesh_lines *lines,
-                      const char **why) {
+int mesh_decode_lines(const unsigned char *bytes, size_t size, const mesh_place *place,
+                      mesh_lines *lines, const char **why) {
     builder b;
     mesh_data message;
-    text in = {(const char *)bytes, (const char *)bytes + size, 1};
+    text in = text_of(bytes, size);
     list colors = list_of(3 * sizeof(float)), points = list_of(3 * sizeof(float));
     list firsts = list_of(sizeof(size_t));
     memset(lines, 0, sizeof *lines);
     memset(&message, 0, sizeof message);
     builder_init(&b, &message, why);
+    in.joins = 1;
     size_t *first = (size_t *)list_add(&firsts, 1);
     int ok = first ? 1 : builder_fail_memory(&b);
     if (first) *first = 0;
     while (ok && in.at < in.end) {
-        text_skip_blanks(&in);
-        const char *word = in.at;
-        while (!text_at_word_end(in.at, in.end)) in.at++;
-        const ptrdiff_t n = in.at - word;
-        if (n == 1 && word[0] == 'v') ok = read_obj_vertex(&b, &in, &colors);
-        else if (n == 1 && word[0] == 'l') ok = read_obj_line(&b, &in, &points, &firsts);
-        if (ok) text_skip_line(&in);
+        const char *word;
+        const size_t n = read_obj_word(&in, &word);
+        if (is_word(word, n, "v")) ok = read_obj_vertex(&b, &in, &colors);
+        else if (is_word(word, n, "l")) ok = read_obj_line(&b, &in, place, &points, &firsts);
+        if (ok) skip_obj_line(&in, word, n);
     }
     if (ok && firsts.count == 1) ok = builder_fail(&b, 0, "no lines in it; lines begin with an l");
     if (ok) {
@@ -233,11 +258,13 @@ typedef struct obj_counts {
     size_t vertices, uvs, normals;
 } obj_counts;
 
-static void print_obj_vertices(sink *s, const mesh_data *m, const split *uvs, const split *normals,
-                               size_t normal_count) {
+static void print_obj_vertices(sink *s, const mesh_data *m, const mesh_place *place,
+                               const split *uvs, const split *normals, size_t normal_count) {
+    const int digits = place_digits(place, m);
     for (size_t i = 0; i < m->vertex_count; i++) {
         const float *p = m->positions + 3 * i;
-        sink_print(s, "v %.9g %.9g %.9g", (double)p[0], (double)p[1], (double)p[2]);
+        sink_print(s, "v %.*g %.*g %.*g", digits, mesh_place_out(place, p[0], 0), digits,
+                   mesh_place_out(place, p[1], 1), digits, mesh_place_out(place, p[2], 2));
         for (size_t k = 0; k < 3 && m->colors; k++)
             sink_print(s, " %.4g", m->colors[4 * i + k] / 255.0);
         sink_put(s, "\n", 1);
@@ -267,7 +294,7 @@ static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_c
     const int has_normals = m->normals || m->corner_normals;
     const size_t normal_count = normals.index ? normals.count : m->normals ? m->vertex_count : 0;
     if (scene->part_count) sink_print(s, "o %.60s\n", part->material->name);
-    print_obj_vertices(s, m, &uvs, &normals, normal_count);
+    print_obj_vertices(s, m, &scene->place, &uvs, &normals, normal_count);
     if (scene->library) sink_print(s, "usemtl %.60s\n", part->material->name);
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
         const size_t v = m->indices[c] + 1;

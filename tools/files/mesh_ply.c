@@ -14,17 +14,17 @@ enum {
 typedef enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG } ply_format;
 
 typedef enum ply_type {
-    PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT, PLY_DOUBLE,
-    PLY_NONE
+    PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_INT64, PLY_UINT64,
+    PLY_FLOAT, PLY_DOUBLE, PLY_NONE
 } ply_type;
 
-static const size_t ply_bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+static const size_t ply_bytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
 
 /* What a property of a vertex is to us. */
 typedef enum ply_role {
     PLY_X, PLY_Y, PLY_Z, PLY_NX, PLY_NY, PLY_NZ, PLY_RED, PLY_GREEN, PLY_BLUE, PLY_ALPHA, PLY_U,
     PLY_V, PLY_QX, PLY_QY, PLY_QZ, PLY_QW, PLY_ROLES,
-    PLY_CORNERS = PLY_ROLES, /* of a face: its vertices */
+    PLY_CORNERS = PLY_ROLES, /* of a face: its vertices; of strips: theirs, -1 between two */
     PLY_OTHER
 } ply_role;
 
@@ -35,7 +35,7 @@ typedef struct ply_property {
 
 typedef struct ply_element {
     size_t count, least; /* least: bytes that one takes in the file at least */
-    int first, properties, has_list, is_vertex, is_face;
+    int first, properties, has_list, is_vertex, is_face, is_strips;
 } ply_element;
 
 typedef struct ply {
@@ -49,6 +49,7 @@ static ply_type ply_type_of(const char *word) {
     static const char *const names[][2] = {{"char", "int8"},     {"uchar", "uint8"},
                                            {"short", "int16"},   {"ushort", "uint16"},
                                            {"int", "int32"},     {"uint", "uint32"},
+                                           {"long", "int64"},    {"ulong", "uint64"},
                                            {"float", "float32"}, {"double", "float64"}};
     for (int t = 0; t < PLY_NONE; t++) {
         if (!strcmp(word, names[t][0]) || !strcmp(word, names[t][1])) return (ply_type)t;
@@ -69,7 +70,8 @@ static ply_role ply_role_of(const ply_element *e, const ply_property *p, const c
                  {"diffuse_blue", PLY_BLUE}, {"qx", PLY_QX}, {"qy", PLY_QY}, {"qz", PLY_QZ},
                  {"qw", PLY_QW}};
     const int is_list = p->counted != PLY_NONE;
-    if (e->is_face && is_list && (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")))
+    const int is_faces = e->is_face || e->is_strips;
+    if (is_faces && is_list && (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")))
         return PLY_CORNERS;
     if (!e->is_vertex || is_list) return PLY_OTHER;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
@@ -82,7 +84,7 @@ static ply_role ply_role_of(const ply_element *e, const ply_property *p, const c
 static const char *next_word(text *in, char word[32]) {
     size_t n = 0;
     while (in->at < in->end && is_blank(*in->at)) in->at++;
-    for (; in->at < in->end && !is_blank(*in->at) && *in->at != '\n'; in->at++) {
+    for (; in->at < in->end && !is_blank(*in->at) && !is_line_end(*in->at); in->at++) {
         if (n < 31) word[n++] = (char)(*in->at >= 'A' && *in->at <= 'Z' ? *in->at + 32 : *in->at);
     }
     word[n] = 0;
@@ -98,6 +100,7 @@ static int read_ply_element(builder *b, ply *h, text *in) {
     next_word(in, word);
     e->is_vertex = !strcmp(word, "vertex");
     e->is_face = !strcmp(word, "face");
+    e->is_strips = !strcmp(word, "tristrips");
     next_word(in, word);
     errno = 0;
     const unsigned long long count = is_digit(word[0]) ? strtoull(word, &stop, 10) : 0;
@@ -132,10 +135,24 @@ static int read_ply_property(builder *b, ply *h, text *in) {
     return 1;
 }
 
+/* Over the end of a header's line. Where lines end in \r, a \n behind the last of them is the first
+   byte of the body; so the first line tells how all of them end. */
+static void end_header_line(text *in, int ends_in_cr) {
+    while (in->at < in->end && !is_line_end(*in->at)) in->at++;
+    if (ends_in_cr && in->at < in->end && *in->at == '\r') {
+        in->at++;
+        in->line++;
+    } else {
+        text_end_line(in);
+    }
+}
+
 static int read_ply_header(builder *b, ply *h, text *in) {
     int has_format = 0, ok = 1;
     memset(h, 0, sizeof *h);
-    text_skip_line(in);
+    while (in->at < in->end && !is_line_end(*in->at)) in->at++;
+    const int ends_in_cr = in->end - in->at > 1 && in->at[0] == '\r' && in->at[1] != '\n';
+    end_header_line(in, ends_in_cr);
     while (ok) {
         char word[32];
         if (in->at == in->end) return builder_fail(b, in->line, "the header has no end");
@@ -152,15 +169,10 @@ static int read_ply_header(builder *b, ply *h, text *in) {
                 return builder_fail(b, in->line, "no known format; ascii or binary is read");
             ok = word[0] == 'e' ? read_ply_element(b, h, in) : read_ply_property(b, h, in);
         }
-        const char *newline = (const char *)memchr(in->at, '\n', (size_t)(in->end - in->at));
-        in->at = newline ? newline + 1 : in->end;
-        if (ok) in->line++;
+        if (ok) end_header_line(in, ends_in_cr);
     }
-    if (!ok) return 0;
-    if (in->at < in->end && *in->at == '\r') in->at++;
-    if (in->at < in->end && *in->at == '\n') in->at++;
-    in->line++;
-    return 1;
+    if (ok) end_header_line(in, ends_in_cr);
+    return ok;
 }
 
 /* ---- reading: the body ------------------------------------------------------------------- */
@@ -183,6 +195,7 @@ static int read_scalar(const ply *h, text *in, ply_type type, double *value) {
     case PLY_INT8: *value = bits < 0x80 ? (double)bits : (double)bits - 0x100; break;
     case PLY_INT16: *value = bits < 0x8000 ? (double)bits : (double)bits - 0x10000; break;
     case PLY_INT32: *value = bits < 0x80000000u ? (double)bits : (double)bits - 4294967296.0; break;
+    case PLY_INT64: *value = bits >> 63 ? -(double)(~bits + 1) : (double)bits; break;
     case PLY_FLOAT: {
         const uint32_t low = (uint32_t)bits;
         float f;
@@ -259,7 +272,7 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
     if (!has_roles(has, PLY_X, 3)) return builder_fail(b, 0, "its vertices have no x, y and z");
     const int has_normal = has_roles(has, PLY_NX, 3), has_color = has_roles(has, PLY_RED, 3);
     const int has_uv = has_roles(has, PLY_U, 2), has_rotation = has_roles(has, PLY_QX, 4);
-    float *position = (float *)list_add(&b->positions, e->count);
+    double *position = (double *)list_add(&b->positions, e->count);
     float *normal = has_normal ? (float *)list_add(&b->normals, e->count) : NULL;
     float *uv = has_uv ? (float *)list_add(&b->uvs, e->count) : NULL;
     float *rotation = has_rotation ? (float *)list_add(&b->rotations, e->count) : NULL;
@@ -270,6 +283,8 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
 
     for (size_t i = 0; i < e->count; i++) {
         int ok = 1;
+        if (h->format == PLY_ASCII) text_skip_space(in);
+        const size_t line = h->format == PLY_ASCII ? in->line : 0;
         for (int k = 0; k < e->properties; k++) {
             if (properties[k].role >= PLY_ROLES) {
                 if (!skip_property(b, h, in, &properties[k])) return 0;
@@ -277,16 +292,15 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
                 return fail_body(b, h, in);
             }
         }
-        for (int k = 0; k < 3; k++) ok &= text_to_float(v[PLY_X + k], &position[3 * i + (size_t)k]);
-        for (int k = 0; k < 3 && has_normal; k++)
-            ok &= text_to_float(v[PLY_NX + k], &normal[3 * i + (size_t)k]);
-        for (int k = 0; k < 2 && has_uv; k++)
-            ok &= text_to_float(v[PLY_U + k], &uv[2 * i + (size_t)k]);
+        memcpy(position + 3 * i, v + PLY_X, 3 * sizeof *position);
+        if (!builder_check_position(b, i, line)) return 0;
+        for (int k = 0; k < 3 && has_normal; k++) normal[3 * i + (size_t)k] = (float)v[PLY_NX + k];
+        for (int k = 0; k < 2 && has_uv; k++) uv[2 * i + (size_t)k] = (float)v[PLY_U + k];
         for (int k = 0; k < 4 && has_rotation; k++)
             ok &= text_to_float(v[PLY_QX + k], &rotation[4 * i + (size_t)k]);
         if (!ok)
-            return builder_fail(b, 0, "vertex %lu has a number that is not finite",
-                                (unsigned long)i);
+            return builder_fail(b, 0, "vertex %lu has a rotation that is not finite",
+                                (unsigned long)i + 1);
         for (int k = 0; k < 4 && has_color; k++)
             color[4 * i + (size_t)k] = k == 3 && !has[PLY_ALPHA]
                                            ? 255
@@ -295,27 +309,45 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
     return 1;
 }
 
-static int read_ply_face(builder *b, const ply *h, const ply_property *p, text *in, size_t index) {
+/* An index of a list, from 0; of strips also -1, as NO_VERTEX. */
+static int read_ply_index(const builder *b, const ply *h, const ply_property *p, text *in,
+                          int is_strip, uint32_t *index) {
+    double value;
+    if (!read_scalar(h, in, p->type, &value)) return fail_body(b, h, in);
+    *index = NO_VERTEX;
+    if (is_strip && value == -1) return 1;
+    if (!(value >= 0 && value < 2147483648.0) || value != floor(value))
+        return builder_fail(b, h->format == PLY_ASCII ? in->line : 0,
+                            "a face with an index that is out of range");
+    *index = (uint32_t)value;
+    return 1;
+}
+
+static int read_ply_face(builder *b, const ply *h, const ply_property *p, text *in) {
     size_t n;
+    const size_t first = b->corners.count;
     if (h->format == PLY_ASCII) text_skip_space(in);
     const size_t line = h->format == PLY_ASCII ? in->line : 0;
     if (!read_length(b, h, in, p, &n)) return 0;
-    if (n < 3)
-        return builder_fail(b, line, "face %lu has less than three corners", (unsigned long)index);
-    polygon *f = (polygon *)list_add(&b->polygons, 1);
-    if (!f) return builder_fail_memory(b);
-    f->first = b->corners.count;
-    f->count = n;
-    f->line = line;
     corner *c = (corner *)list_add(&b->corners, n);
     if (!c) return builder_fail_memory(b);
     for (size_t k = 0; k < n; k++) {
-        double value;
-        if (!read_scalar(h, in, p->type, &value)) return fail_body(b, h, in);
-        if (!(value >= 0 && value < 2147483648.0) || value != floor(value))
-            return builder_fail(b, line, "face %lu has an index that is out of range",
-                                (unsigned long)index);
-        c[k].vertex = c[k].uv = (uint32_t)value;
+        if (!read_ply_index(b, h, p, in, 0, &c[k].vertex)) return 0;
+        c[k].uv = c[k].vertex;
+    }
+    return builder_add_polygon(b, first, line);
+}
+
+/* Triangles of three successive vertices each, every second one turned round. -1 begins anew. */
+static int read_ply_strips(builder *b, const ply *h, const ply_property *p, text *in) {
+    size_t n;
+    strip s = strip_begin();
+    if (!read_length(b, h, in, p, &n)) return 0;
+    for (size_t k = 0; k < n; k++) {
+        uint32_t index;
+        if (!read_ply_index(b, h, p, in, 1, &index)) return 0;
+        if (index == NO_VERTEX) s = strip_begin();
+        else if (!strip_add(b, &s, index)) return 0;
     }
     return 1;
 }
@@ -335,8 +367,9 @@ static int read_ply_elements(builder *b, const ply *h, const ply_element *e, tex
     for (size_t i = 0; i < e->count; i++) {
         for (int k = 0; k < e->properties; k++) {
             const ply_property *p = &h->properties[e->first + k];
-            const int ok = p->role == PLY_CORNERS ? read_ply_face(b, h, p, in, i)
-                                                  : skip_property(b, h, in, p);
+            const int ok = p->role != PLY_CORNERS ? skip_property(b, h, in, p)
+                           : e->is_strips         ? read_ply_strips(b, h, p, in)
+                                                  : read_ply_face(b, h, p, in);
             if (!ok) return 0;
         }
     }
@@ -359,12 +392,14 @@ int mesh_read_ply(builder *b, text *in, int points_too) {
 
 /* ---- writing ----------------------------------------------------------------------------- */
 
-int mesh_write_ply(const mesh_data *m, sink *s) {
+int mesh_write_ply(const mesh_data *m, const mesh_place *place, sink *s) {
+    const int is_plain = place_is_plain(place); /* else floats would lose the shape */
+    const char *type = is_plain ? "float" : "double";
     flat_mesh f;
     if (!flat_make(m, 0, &f)) return 0;
     sink_print(s, "ply\nformat binary_little_endian 1.0\nelement vertex %lu\n",
                (unsigned long)f.count);
-    sink_print(s, "property float x\nproperty float y\nproperty float z\n");
+    sink_print(s, "property %s x\nproperty %s y\nproperty %s z\n", type, type, type);
     if (m->normals) sink_print(s, "property float nx\nproperty float ny\nproperty float nz\n");
     if (m->colors)
         sink_print(s, "property uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -376,7 +411,11 @@ int mesh_write_ply(const mesh_data *m, sink *s) {
     sink_print(s, "end_header\n");
     for (size_t i = 0; i < f.count; i++) {
         const size_t v = flat_vertex(&f, i);
-        sink_floats(s, m->positions + 3 * v, 3);
+        double p[3];
+        for (int k = 0; k < 3; k++) p[k] = mesh_place_out(place, m->positions[3 * v + (size_t)k], k);
+        const float single[3] = {(float)p[0], (float)p[1], (float)p[2]};
+        if (is_plain) sink_floats(s, single, 3);
+        else sink_doubles(s, p, 3);
         if (m->normals) sink_floats(s, m->normals + 3 * v, 3);
         if (m->colors) sink_put(s, m->colors + 4 * v, 4);
         if (m->uvs) {

@@ -19,14 +19,14 @@ static int same_point(const double *a, const double *b) {
 
 /* The corners seen along the axis that the polygon faces most, so that they run
    counter-clockwise. */
-static void flatten(const float *positions, const corner *p, size_t n, point *flat) {
+static void flatten(const double *positions, const corner *p, size_t n, point *flat) {
     double normal[3] = {0, 0, 0};
     for (size_t i = 0; i < n; i++) { /* Newell's sum: right for any polygon, flat or not */
-        const float *a = positions + 3 * (size_t)p[i].vertex;
-        const float *b = positions + 3 * (size_t)p[i + 1 < n ? i + 1 : 0].vertex;
+        const double *a = positions + 3 * (size_t)p[i].vertex;
+        const double *b = positions + 3 * (size_t)p[i + 1 < n ? i + 1 : 0].vertex;
         for (int k = 0; k < 3; k++) {
             const int y = (k + 1) % 3, z = (k + 2) % 3;
-            normal[k] += ((double)a[y] - (double)b[y]) * ((double)a[z] + (double)b[z]);
+            normal[k] += (a[y] - b[y]) * (a[z] + b[z]);
         }
     }
     int axis = 0;
@@ -35,9 +35,9 @@ static void flatten(const float *positions, const corner *p, size_t n, point *fl
     }
     const int x = (axis + 1) % 3, y = (axis + 2) % 3;
     for (size_t i = 0; i < n; i++) {
-        const float *a = positions + 3 * (size_t)p[i].vertex;
-        flat[i][0] = (double)a[normal[axis] < 0 ? y : x];
-        flat[i][1] = (double)a[normal[axis] < 0 ? x : y];
+        const double *a = positions + 3 * (size_t)p[i].vertex;
+        flat[i][0] = a[normal[axis] < 0 ? y : x];
+        flat[i][1] = a[normal[axis] < 0 ? x : y];
     }
 }
 
@@ -79,7 +79,7 @@ int polygon_triangulate(builder *b, const corner *p, size_t n) {
         around = (size_t *)list_add(&b->around, n);
         if (!flat || !around) return builder_fail_memory(b);
         for (size_t i = 0; i < n; i++) around[i] = i;
-        flatten((const float *)b->positions.items, p, n, flat);
+        flatten((const double *)b->positions.items, p, n, flat);
         if (!is_convex((const point *)flat, n)) {
             size_t tries = 8 * n, i = 1; /* a polygon that crosses itself may run out of ears */
             for (; left > 3 && tries > 0; tries--) {

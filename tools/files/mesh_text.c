@@ -2,66 +2,106 @@
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "mesh_file.h"
 
-/* To the next word of this line; a backslash at the end of a line joins the next one on. */
+text text_of(const void *bytes, size_t size) {
+    static const unsigned char mark[3] = {0xef, 0xbb, 0xbf}; /* that some editors put before UTF-8 */
+    text in;
+    memset(&in, 0, sizeof in);
+    in.at = (const char *)bytes;
+    in.end = in.at + size;
+    in.line = 1;
+    if (size >= sizeof mark && !memcmp(bytes, mark, sizeof mark)) in.at += sizeof mark;
+    return in;
+}
+
 void text_skip_blanks(text *in) {
     while (in->at < in->end) {
         if (is_blank(*in->at)) {
             in->at++;
-        } else if (*in->at == '\\') {
+        } else if (*in->at == '\\' && in->joins) {
             const char *p = in->at + 1;
-            if (p < in->end && *p == '\r') p++;
-            if (p == in->end || *p != '\n') return;
-            in->at = p + 1;
-            in->line++;
+            while (p < in->end && is_blank(*p)) p++;
+            if (p == in->end || !is_line_end(*p)) return;
+            in->at = p;
+            text_end_line(in);
         } else {
             return;
         }
     }
 }
 
-/* To the beginning of the next line. */
-void text_skip_line(text *in) {
-    for (;;) {
-        const char *newline = (const char *)memchr(in->at, '\n', (size_t)(in->end - in->at));
-        if (!newline) {
-            in->at = in->end;
-            return;
-        }
-        const char *last = newline;
-        if (last > in->at && last[-1] == '\r') last--;
-        const int goes_on = last > in->at && last[-1] == '\\';
-        in->at = newline + 1;
-        in->line++;
-        if (!goes_on) return;
-    }
+void text_end_line(text *in) {
+    const char *p = in->at;
+    if (p == in->end) return;
+    in->at += *p == '\r' && in->end - p > 1 && p[1] == '\n' ? 2 : 1;
+    in->line++;
 }
 
-/* To the next word, on whichever line. */
+void text_skip_line(text *in) {
+    while (in->at < in->end && !is_line_end(*in->at)) in->at++;
+    text_end_line(in);
+}
+
+void text_skip_rest(text *in) {
+    for (text_skip_blanks(in); in->at < in->end && !is_line_end(*in->at) && *in->at != '#';
+         text_skip_blanks(in)) {
+        in->at++; /* a backslash that is no word's end, too */
+        while (!text_at_word_end(in->at, in->end)) in->at++;
+    }
+    text_skip_line(in);
+}
+
 void text_skip_space(text *in) {
-    while (in->at < in->end && (is_blank(*in->at) || *in->at == '\n')) {
-        if (*in->at == '\n') in->line++;
-        in->at++;
+    while (in->at < in->end) {
+        if (is_blank(*in->at)) in->at++;
+        else if (is_line_end(*in->at)) text_end_line(in);
+        else return;
     }
 }
 
 int text_at_word_end(const char *p, const char *end) {
-    return p == end || is_blank(*p) || *p == '\n' || *p == '\\';
+    return p == end || is_blank(*p) || is_line_end(*p) || *p == '\\';
 }
 
-/* For numbers that text_number cannot convert exactly itself. */
+/* Does this word, in lower case, say that there is no number: nan, -nan(ind), 1.#QNAN00? */
+static int is_no_number(const char *word) {
+    if (*word == '-' || *word == '+') word++;
+    return !strncmp(word, "nan", 3) || (strstr(word, ".#") && !strstr(word, ".#inf"));
+}
+
+/* What strtod might take but is no decimal number: infinity and numbers in other bases. */
+static int is_decimal(const char *word) {
+    if (*word == '-' || *word == '+') word++;
+    return is_digit(*word) ? word[1] != 'x' : *word == '.' && is_digit(word[1]);
+}
+
+/* For numbers that text_number cannot convert exactly itself, and for words that stand for some. */
 static int read_number_slowly(text *in, double *value) {
     char word[512], *stop;
-    size_t n = 0;
+    size_t n = 0, commas = 0, points = 0;
     while (!text_at_word_end(in->at + n, in->end)) {
+        char c = in->at[n];
         if (n + 1 == sizeof word) return 0;
-        word[n] = in->at[n];
-        n++;
+        if (c >= 'A' && c <= 'Z') c = (char)(c + 'a' - 'A');
+        if (c == 'd' && n && is_digit(in->at[n - (in->at[n - 1] == '.' && n > 1 ? 2 : 1)]))
+            c = 'e'; /* 1.5D+00, as Fortran writes */
+        points += c == '.';
+        commas += c == ',';
+        if (c == ',') c = '.';
+        word[n++] = c;
     }
     word[n] = 0;
-    if (n == 0) return 0;
-    *value = strtod(word, &stop);
+    if (n == 0 || commas > 1 || (commas && points)) return 0;
+    if (is_no_number(word)) *value = NAN;
+    else if (strstr(word, "inf")) *value = word[0] == '-' ? -INFINITY : INFINITY;
+    else if (is_decimal(word)) {
+        *value = strtod(word, &stop);
+        if (stop != word + n) return 0;
+    } else {
+        return 0;
+    }
     in->at += n;
-    return stop == word + n;
+    in->commas += commas;
+    return 1;
 }
 
 /* The number that begins here, correctly rounded to double. A decimal number of up to 15 digits is an
@@ -81,7 +121,7 @@ int text_number(text *in, double *value) {
         for (p++; p < in->end && is_digit(*p) && digits < exact; p++, any = 1, exponent--)
             digits = 10 * digits + (uint64_t)(*p - '0');
     }
-    if (any && p < in->end && (*p == 'e' || *p == 'E')) {
+    if (any && p < in->end && (*p == 'e' || *p == 'E' || *p == 'd' || *p == 'D')) {
         int e = 0, down = 0;
         p++;
         if (p < in->end && (*p == '-' || *p == '+')) down = *p++ == '-';
@@ -98,7 +138,6 @@ int text_number(text *in, double *value) {
     return 1;
 }
 
-/* The same for a number that must be finite as a float. */
 int text_to_float(double value, float *to) {
     *to = (float)value; /* too large: infinite, as in IEEE 754 */
     return txm_is_finite((double)*to);

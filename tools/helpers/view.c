@@ -210,8 +210,8 @@ static int draw(options *o, mesh_data *mesh, mesh_data *points, mesh_data *spher
     mesh_scene scene = {0};
     mesh_instances copy = {spheres, 1, nowhere, NULL, NULL, NULL, NULL, NULL};
     const char *why = "out of memory";
-    if (!mesh_read(o->mesh, 1, mesh, &why)) return fail(o->mesh, why);
-    if (o->points && !mesh_read(o->points, 1, points, &why)) return fail(o->points, why);
+    if (!mesh_read(o->mesh, MESH_POINTS | MESH_UNMOVED, mesh, &why)) return fail(o->mesh, why);
+    if (o->points && !mesh_read(o->points, MESH_POINTS | MESH_UNMOVED, points, &why)) return fail(o->points, why);
     if (o->texture && !image_read(o->texture, 3, texture, &why)) return fail(o->texture, why);
     if (o->texture) o->desc.texture = texture;
     if (o->radius == 0) o->radius = extent_of(mesh) / 100;
