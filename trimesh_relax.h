@@ -4,7 +4,7 @@
    WHAT IT DOES
      Takes a triangle mesh of any shape and quality and covers the same surface with a given number
      of vertices whose triangles are as equilateral and equal as the surface allows: a closed or
-     bordered manifold of the same topology, with creases and borders preserved. Such triangles are
+     bordered manifold of the same topology, with creases, borders and (if given) seams preserved. Such triangles are
      easy to texture: see trimesh_cover.h.
 
    QUICK START                                 (tests build and run this very block)
@@ -109,7 +109,7 @@ extern "C" {
 /* What keeps a vertex from moving freely. */
 typedef enum trimesh_kind {
     TRIMESH_FREE = 0,   /* anywhere on the surface           */
-    TRIMESH_CREASE = 1, /* on a crease line                  */
+    TRIMESH_CREASE = 1, /* on a crease line or a seam        */
     TRIMESH_BORDER = 2, /* on the border                     */
     TRIMESH_CORNER = 3  /* where lines meet, end or bend: never moves */
 } trimesh_kind;
@@ -144,6 +144,7 @@ typedef struct trimesh_report {
     size_t loops;               /* border loops                                              */
     long euler;                 /* vertices - edges + triangles after the repair             */
     size_t crease_edges;        /* edges kept as creases                                     */
+    size_t seam_edges;          /* edges kept as seams, some of which may be creases, too    */
     uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that is not repairable  */
 } trimesh_report;
 
@@ -174,6 +175,12 @@ typedef struct trimesh_desc {
                               bounding box, 0..0.01; 0 = only those in the same place           */
     int iterations;        /* TRIMESH_REPEL: maximum rounds of repulsion, 1..1000; 0 = 40       */
     uint64_t seed;         /* another seed gives another result                                 */
+    const uint32_t *seams; /* 3 per triangle, one for each corner, any numbers, such as the indices
+                              of an OBJ file's texture coordinates: where two triangles meet in an
+                              edge and have different numbers at one of its ends, that edge is part
+                              of a seam, which the result's edges follow as they follow creases; but
+                              the surface is smooth there. Connected seams shorter than 3 edges of
+                              the result are left out. NULL = none                             */
     trimesh_report *report; /* out: receives what was found in the input, also after an error;
                               NULL = no report                                                  */
 } trimesh_desc;
@@ -319,7 +326,8 @@ static int32_t tmr_prev(int32_t c) {
 
 /* ---- the input, mended ------------------------------------------------------------------- */
 
-enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
+/* Kinds of edges. A seam may be a crease as well: then both bits are set. */
+enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2, TMR_SEAM_EDGE = 4 };
 
 /* An oriented manifold, perhaps with borders; does not change while points move on it. Scaled so
    that the bounding box has its centre at 0 and a diagonal of 1. */
@@ -1415,9 +1423,78 @@ static txm_status tmr_surface_build(const trimesh_desc *desc, txm_env *env, txm_
     return status;
 }
 
+/* ---- seams ------------------------------------------------------------------------------- */
+
+#define TMR_SAME_CORNER 1e-4 /* ours: of the longest side; nearer vertices are a triangle's own corners */
+
+#define TMR_SHORTEST_SEAM 3 /* ours: in edge lengths; connected seams need as many vertices       */
+
+/* The corners of a triangle of the caller, scaled as the surface is. */
+static void tmr_caller_corners(const tmr_surface *s, const trimesh_desc *desc, uint32_t triangle,
+                               txm_dvec3 p[3]) {
+    for (size_t k = 0; k < 3; k++) {
+        const size_t v = desc->surface.indices[3 * (size_t)triangle + k];
+        const float *q = desc->surface.positions + 3 * v;
+        p[k] = txm_d3_scale(txm_d3_sub(txm_d3(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
+    }
+}
+
+/* The entry of desc->seams at corner c of the surface. Where mending has changed a face, its vertices
+   are looked for among the corners of the caller's triangle that it came from. Returns 0 if it is
+   none of them, as a vertex in the middle of a side of that triangle. */
+static int tmr_seam_entry(const tmr_surface *s, const trimesh_desc *desc, int32_t c,
+                          uint32_t *entry) {
+    const int32_t f = c / 3;
+    const int turn = s->turn[f], k = (int)(c % 3);
+    const uint32_t *entries = desc->seams + 3 * (size_t)s->origin[f];
+    txm_dvec3 p[3];
+    double longest = 0;
+    int best = 0;
+    if (turn < TMR_MAPPED) {
+        *entry = entries[turn < 4 ? (k + turn) % 3 : (turn - 4 - k + 3) % 3];
+        return 1;
+    }
+    tmr_caller_corners(s, desc, s->origin[f], p);
+    const txm_dvec3 own = s->point[s->vertex[c]];
+    for (int i = 0; i < 3; i++) {
+        longest = fmax(longest, txm_d3_dist2(p[i], p[(i + 1) % 3]));
+        if (txm_d3_dist2(p[i], own) < txm_d3_dist2(p[best], own)) best = i;
+    }
+    *entry = entries[best];
+    return txm_d3_dist2(p[best], own) <= TMR_SAME_CORNER * TMR_SAME_CORNER * longest;
+}
+
+/* Do the two triangles at the edge opposite to c have different entries at one of its ends? */
+static int tmr_is_seam(const tmr_surface *s, const trimesh_desc *desc, int32_t c) {
+    const int32_t o = s->opposite[c];
+    const int32_t here[2] = {tmr_next(c), tmr_prev(c)}, there[2] = {tmr_prev(o), tmr_next(o)};
+    uint32_t one = 0, two = 0;
+    for (int end = 0; end < 2; end++) {
+        if (tmr_seam_entry(s, desc, here[end], &one) && tmr_seam_entry(s, desc, there[end], &two) &&
+            one != two)
+            return 1;
+    }
+    return 0;
+}
+
+/* Mark the seams in s->edge_kind, beside what is there already. */
+static void tmr_mark_seams(tmr_surface *s, const trimesh_desc *desc) {
+    for (int32_t c = 0; c < 3 * s->face_count && desc->seams; c++) {
+        const int32_t o = s->opposite[c];
+        if (o < c || !tmr_is_seam(s, desc, c)) continue;
+        s->edge_kind[c] |= TMR_SEAM_EDGE;
+        s->edge_kind[o] |= TMR_SEAM_EDGE;
+    }
+}
+
+/* What makes a line: border, seam or crease. A seam that is a crease in part is one line. */
+static int tmr_line_class(int edge_kind) {
+    return edge_kind & TMR_SEAM_EDGE ? TMR_SEAM_EDGE : edge_kind;
+}
+
 /* ---- creases and borders as lines --------------------------------------------------------- */
 
-/* Creases and borders, cut into lines at the vertices that must stay: where they meet, end or turn
+/* Creases, seams and borders, cut into lines at the vertices that must stay: where they meet, end or turn
    sharply. A line is a run of segments, each an edge of the surface. */
 typedef struct tmr_lines {
     int32_t line_count, segment_count;
@@ -1431,6 +1508,7 @@ typedef struct tmr_lines {
     double *start;    /* 1 per segment: distance from the beginning of the line to a            */
     int32_t *edge;    /* 1 per corner of the surface: 0, or 1 + the line that its edge is part of */
     uint8_t *kind;    /* 1 per vertex of the surface: trimesh_kind                              */
+    uint8_t *smooth;  /* 1 per vertex of the surface: on seams, without a crease or border      */
     int32_t *segment; /* 1 per vertex of the surface: on a line one of its segments             */
 } tmr_lines;
 
@@ -1515,9 +1593,10 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
     return TXM_OK;
 }
 
-/* Connected creases of less than the given length in all are noise: make them plain. */
-static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
-                                         txm_arena *arena) {
+/* Connected lines of less than the given length in all are noise, or cannot be followed: make them
+   plain. Those with an edge of one of the kinds in the mask `kept` stay. */
+static txm_status tmr_drop_short_lines(tmr_surface *s, const tmr_ends *ends, double least, int kept,
+                                       txm_arena *arena) {
     const int32_t n = s->vertex_count;
     int32_t *stack = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
     uint8_t *seen = (uint8_t *)txm_arena_zero(arena, (size_t)n, 1);
@@ -1525,7 +1604,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
     for (int32_t v = 0; v < n; v++) {
         int32_t size = 0, done = 0;
         double length = 0;
-        int has_border = 0;
+        int stays = 0;
         if (seen[v] || ends->first[v] == ends->first[v + 1]) continue;
         seen[v] = 1;
         stack[size++] = v;
@@ -1533,7 +1612,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
             const int32_t u = stack[done];
             for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
                 const int32_t w = tmr_other_end(s, ends->corner[e], u);
-                has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
+                stays |= s->edge_kind[ends->corner[e]] & kept;
                 length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
                     seen[w] = 1;
@@ -1541,7 +1620,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
                 }
             }
         }
-        if (length >= least || has_border) continue;
+        if (length >= least || stays) continue;
         for (int32_t i = 0; i < size; i++) {
             for (int32_t e = ends->first[stack[i]]; e < ends->first[stack[i] + 1]; e++) {
                 const int32_t c = ends->corner[e];
@@ -1584,7 +1663,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
         kind[v] = TRIMESH_CORNER;
         if (count != 2) continue;
         const int32_t c = ends->corner[k], d = ends->corner[k + 1];
-        if (s->edge_kind[c] != s->edge_kind[d]) continue;
+        if (tmr_line_class(s->edge_kind[c]) != tmr_line_class(s->edge_kind[d])) continue;
         kind[v] = s->edge_kind[c] == TMR_BORDER_EDGE ? TRIMESH_BORDER : TRIMESH_CREASE;
         turn[v] = (float)(1 + txm_d3_dot(tmr_line_direction(s, ends, v, c, reach),
                                          tmr_line_direction(s, ends, v, d, reach)));
@@ -1692,19 +1771,54 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->first[id + 1] = l->segment_count;
 }
 
+/* Find creases and seams, and list the ends of the edges that stay. */
+static txm_status tmr_find_lines(tmr_surface *s, const trimesh_desc *desc, double angle,
+                                 double spacing, txm_arena *scratch, tmr_ends *ends) {
+    txm_status status;
+    if (tmr_find_creases(s, angle)) {
+        if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
+        status = tmr_drop_short_lines(s, ends, fmax(5 * spacing, 0.06), TMR_BORDER_EDGE, scratch);
+        if (status != TXM_OK) return status;
+    }
+    if (desc->seams) {
+        tmr_mark_seams(s, desc);
+        if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
+        status = tmr_drop_short_lines(s, ends, TMR_SHORTEST_SEAM * spacing,
+                                      TMR_BORDER_EDGE | TMR_CREASE_EDGE, scratch);
+        if (status != TXM_OK) return status;
+    }
+    return tmr_list_ends(s, scratch, ends);
+}
+
+/* Which vertices are on seams only? There the surface is smooth. */
+static void tmr_find_smooth(const tmr_surface *s, const tmr_ends *ends, uint8_t *smooth) {
+    for (int32_t v = 0; v < s->vertex_count; v++) {
+        int kinds = 0;
+        for (int32_t e = ends->first[v]; e < ends->first[v + 1]; e++)
+            kinds |= s->edge_kind[ends->corner[e]];
+        smooth[v] = kinds == TMR_SEAM_EDGE;
+    }
+}
+
+/* Count the edges of creases and seams for the report. */
+static void tmr_count_lines(const tmr_surface *s, trimesh_report *report) {
+    report->crease_edges = report->seam_edges = 0;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        if (!tmr_represents_edge(s, c)) continue;
+        report->crease_edges += (s->edge_kind[c] & TMR_CREASE_EDGE) != 0;
+        report->seam_edges += (s->edge_kind[c] & TMR_SEAM_EDGE) != 0;
+    }
+}
+
 /* Find all lines. spacing: the edge length of the result, which decides which creases are too short
    and which bends too slight. */
-static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
-                                  txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
+static txm_status tmr_lines_build(tmr_surface *s, const trimesh_desc *desc, double angle,
+                                  double spacing, txm_arena *arena, txm_arena *scratch,
+                                  trimesh_report *report, tmr_lines *l) {
     tmr_ends ends;
     const size_t n = (size_t)s->vertex_count, corners = 3 * (size_t)s->face_count;
     txm_status status;
-    if (tmr_find_creases(s, angle)) {
-        if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
-        status = tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch);
-        if (status != TXM_OK) return status;
-    }
-    if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
+    if ((status = tmr_find_lines(s, desc, angle, spacing, scratch, &ends)) != TXM_OK) return status;
     /* each edge is listed at both its ends and becomes one segment; no line is without segments */
     const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
     l->line_count = l->segment_count = 0;
@@ -1719,8 +1833,10 @@ static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, 
     l->start = (double *)txm_arena_alloc(arena, segments + 1, sizeof(double));
     l->edge = (int32_t *)txm_arena_zero(arena, corners, sizeof(int32_t));
     l->kind = (uint8_t *)txm_arena_alloc(arena, n, 1);
+    l->smooth = (uint8_t *)txm_arena_alloc(arena, n, 1);
     l->segment = (int32_t *)txm_arena_zero(arena, n, sizeof(int32_t));
     if ((status = tmr_check_memory(arena)) != TXM_OK) return status;
+    tmr_find_smooth(s, &ends, l->smooth);
     status = tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind);
     if (status == TXM_OK && angle < 180)
         status = tmr_find_tips(s, 0.75 * spacing, scratch, l->kind);
@@ -1732,10 +1848,13 @@ static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, 
                 if (!l->edge[ends.corner[k]]) tmr_trace(s, &ends, l, v, ends.corner[k]);
         }
     }
-    *crease_edges = 0;
-    for (int32_t i = 0; i < l->line_count; i++)
-        if (!l->border[i]) *crease_edges += (size_t)(l->first[i + 1] - l->first[i]);
+    tmr_count_lines(s, report);
     return TXM_OK;
+}
+
+/* Is segment k part of a seam where the surface is smooth? */
+static int tmr_is_smooth_segment(const tmr_lines *l, int32_t k) {
+    return l->smooth[l->a[k]] && l->smooth[l->b[k]];
 }
 
 /* the segment behind (step 1) or before (-1) segment k of its line; -1 at the end */
@@ -2228,7 +2347,8 @@ static txm_dvec3 tmr_normal_at(const tmr_surface *s, const tmr_lines *l, const t
     txm_dvec3 n = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
         const int32_t v = s->vertex[3 * at->face + k];
-        const int sharp = l->kind[v] == TRIMESH_CREASE || l->kind[v] == TRIMESH_CORNER;
+        const int sharp =
+            (l->kind[v] == TRIMESH_CREASE || l->kind[v] == TRIMESH_CORNER) && !l->smooth[v];
         n = txm_d3_mad(n, sharp ? s->normal[at->face] : s->vertex_normal[v], w[k]);
     }
     return txm_d3_len2(n) > 0.01 ? txm_d3_unit(n) : s->normal[at->face];
@@ -2464,13 +2584,9 @@ static txm_mesh_place tmr_surface_source(const tmr_surface *s, const trimesh_des
         for (int k = 0; k < 3; k++)
             weight[turn < 4 ? (k + turn) % 3 : (turn - 4 - k + 3) % 3] = own[k];
     } else {
-        const uint32_t *i = desc->surface.indices + 3 * (size_t)source.triangle;
         txm_dvec3 p[3];
         int part;
-        for (int k = 0; k < 3; k++) {
-            const float *q = desc->surface.positions + 3 * (size_t)i[k];
-            p[k] = txm_d3_scale(txm_d3_sub(txm_d3(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
-        }
+        tmr_caller_corners(s, desc, source.triangle, p);
         tmr_nearest(at->p, p[0], p[1], p[2], &weight[1], &weight[2], &part);
     }
     source.u = txm_clampf(txm_float(weight[1]), 0, 1);
@@ -3928,6 +4044,13 @@ static double tmr_height_over(const tmr_work *w, int32_t face) {
     return 0.75 * txm_d3_dot(txm_d3_sub(at.p, centre), n) + 0.25 * sum / 3;
 }
 
+/* May fitting take v off the surface? Creases and borders stay where they are. */
+static int tmr_may_fit(const tmr_work *w, int32_t v) {
+    const int kind = tmr_kind_of(&w->m, v);
+    return kind == TRIMESH_FREE ||
+           (kind == TRIMESH_CREASE && tmr_is_smooth_segment(w->l, w->m.source[v]));
+}
+
 static void tmr_fit_chunk(void *context, int index) {
     tmr_work *w = (tmr_work *)context;
     const tmr_mesh *m = &w->m;
@@ -3935,7 +4058,7 @@ static void tmr_fit_chunk(void *context, int index) {
     const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
     for (int32_t v = from; v < to; v++) {
         tmr_keep_place(w, v);
-        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || tmr_kind_of(m, v) != TRIMESH_FREE) continue;
+        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || !tmr_may_fit(w, v)) continue;
         double sum = 0;
         int count = 0;
         int32_t c = m->corner[v];
@@ -5194,8 +5317,12 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
 /* where vertex v lies in the caller's triangles */
 static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     const tmr_surface *s = w->s;
-    const int32_t face = tmr_face_of(w, v);
-    const tmr_place at = tmr_on_face(s, face, w->m.p[v]);
+    tmr_place at = tmr_on_face(s, tmr_face_of(w, v), w->m.p[v]);
+    if (tmr_kind_of(&w->m, v) == TRIMESH_CREASE && tmr_is_smooth_segment(w->l, w->m.source[v])) {
+        int32_t k = w->m.source[v]; /* fitting has taken it off the line */
+        const txm_dvec3 p = tmr_project_line(s, w->l, w->m.p[v], &k);
+        at = tmr_on_face(s, w->l->face[k], p);
+    }
     return tmr_surface_source(s, w->desc, &at);
 }
 
@@ -5352,7 +5479,6 @@ static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
 
 /* Mend the surface, find its lines. */
 static txm_status tmr_job_mend(trimesh_job *job) {
-    size_t crease_edges = 0;
     const float angle = job->desc.crease_angle > 0 ? job->desc.crease_angle : TMR_CREASE_ANGLE;
     txm_status status =
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
@@ -5363,10 +5489,9 @@ static txm_status tmr_job_mend(trimesh_job *job) {
         status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
                                  &job->scratch);
     if (status == TXM_OK)
-        status = tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
-                                 &crease_edges, &job->l);
+        status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job), &job->input,
+                                 &job->scratch, &job->report, &job->l);
     if (status != TXM_OK) return status;
-    job->report.crease_edges = crease_edges;
     job->w.s = &job->s;
     job->w.l = &job->l;
     job->w.desc = &job->desc;
@@ -6322,7 +6447,6 @@ static double tmr_points_for(const tmr_update *u) {
 
 static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     txm_env *env = u->w.env;
-    size_t crease_edges = 0;
     const float angle = u->desc.crease_angle > 0 ? u->desc.crease_angle : TMR_CREASE_ANGLE;
     trimesh_desc desc = u->desc;
     if (desc.vertices == 0) desc.vertices = u->old->vertex_count;
@@ -6332,10 +6456,9 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     if (u->desc.adapt > 0)
         status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
     if (status == TXM_OK)
-        status =
-            tmr_lines_build(&u->s, angle, length, &u->input, &u->scratch, &crease_edges, &u->l);
+        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch, report,
+                                 &u->l);
     if (status != TXM_OK) return status;
-    report->crease_edges = crease_edges;
     u->w.desc = &u->desc;
     u->w.s = &u->s;
     u->w.l = &u->l;

@@ -4,7 +4,7 @@
    WHAT IT DOES
      Takes a triangle mesh of any shape and quality and covers the same surface with a given number
      of vertices whose triangles are as equilateral and equal as the surface allows: a closed or
-     bordered manifold of the same topology, with creases and borders preserved. Such triangles are
+     bordered manifold of the same topology, with creases, borders and (if given) seams preserved. Such triangles are
      easy to texture: see trimesh_cover.h.
 
    QUICK START                                 (tests build and run this very block)
@@ -109,7 +109,7 @@ extern "C" {
 /* What keeps a vertex from moving freely. */
 typedef enum trimesh_kind {
     TRIMESH_FREE = 0,   /* anywhere on the surface           */
-    TRIMESH_CREASE = 1, /* on a crease line                  */
+    TRIMESH_CREASE = 1, /* on a crease line or a seam        */
     TRIMESH_BORDER = 2, /* on the border                     */
     TRIMESH_CORNER = 3  /* where lines meet, end or bend: never moves */
 } trimesh_kind;
@@ -144,6 +144,7 @@ typedef struct trimesh_report {
     size_t loops;               /* border loops                                              */
     long euler;                 /* vertices - edges + triangles after the repair             */
     size_t crease_edges;        /* edges kept as creases                                     */
+    size_t seam_edges;          /* edges kept as seams, some of which may be creases, too    */
     uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that is not repairable  */
 } trimesh_report;
 
@@ -174,6 +175,12 @@ typedef struct trimesh_desc {
                               bounding box, 0..0.01; 0 = only those in the same place           */
     int iterations;        /* TRIMESH_REPEL: maximum rounds of repulsion, 1..1000; 0 = 40       */
     uint64_t seed;         /* another seed gives another result                                 */
+    const uint32_t *seams; /* 3 per triangle, one for each corner, any numbers, such as the indices
+                              of an OBJ file's texture coordinates: where two triangles meet in an
+                              edge and have different numbers at one of its ends, that edge is part
+                              of a seam, which the result's edges follow as they follow creases; but
+                              the surface is smooth there. Connected seams shorter than 3 edges of
+                              the result are left out. NULL = none                             */
     trimesh_report *report; /* out: receives what was found in the input, also after an error;
                               NULL = no report                                                  */
 } trimesh_desc;
@@ -295,6 +302,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/mend.h"
 #include "trimesh_relax/mend_thin.h"
 #include "trimesh_relax/mend_all.h"
+#include "trimesh_relax/seams.h"
 #include "trimesh_relax/creases.h"
 #include "trimesh_relax/density.h"
 #include "trimesh_relax/mesh.h"

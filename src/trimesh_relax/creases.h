@@ -1,11 +1,11 @@
 #ifndef TRIMESH_RELAX_CREASES_H
 #define TRIMESH_RELAX_CREASES_H
 
-#include "surface.h"
+#include "seams.h"
 
 /* ---- creases and borders as lines --------------------------------------------------------- */
 
-/* Creases and borders, cut into lines at the vertices that must stay: where they meet, end or turn
+/* Creases, seams and borders, cut into lines at the vertices that must stay: where they meet, end or turn
    sharply. A line is a run of segments, each an edge of the surface. */
 typedef struct tmr_lines {
     int32_t line_count, segment_count;
@@ -19,6 +19,7 @@ typedef struct tmr_lines {
     double *start;    /* 1 per segment: distance from the beginning of the line to a            */
     int32_t *edge;    /* 1 per corner of the surface: 0, or 1 + the line that its edge is part of */
     uint8_t *kind;    /* 1 per vertex of the surface: trimesh_kind                              */
+    uint8_t *smooth;  /* 1 per vertex of the surface: on seams, without a crease or border      */
     int32_t *segment; /* 1 per vertex of the surface: on a line one of its segments             */
 } tmr_lines;
 
@@ -103,9 +104,10 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
     return TXM_OK;
 }
 
-/* Connected creases of less than the given length in all are noise: make them plain. */
-static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, double least,
-                                         txm_arena *arena) {
+/* Connected lines of less than the given length in all are noise, or cannot be followed: make them
+   plain. Those with an edge of one of the kinds in the mask `kept` stay. */
+static txm_status tmr_drop_short_lines(tmr_surface *s, const tmr_ends *ends, double least, int kept,
+                                       txm_arena *arena) {
     const int32_t n = s->vertex_count;
     int32_t *stack = (int32_t *)txm_arena_alloc(arena, (size_t)n, sizeof(int32_t));
     uint8_t *seen = (uint8_t *)txm_arena_zero(arena, (size_t)n, 1);
@@ -113,7 +115,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
     for (int32_t v = 0; v < n; v++) {
         int32_t size = 0, done = 0;
         double length = 0;
-        int has_border = 0;
+        int stays = 0;
         if (seen[v] || ends->first[v] == ends->first[v + 1]) continue;
         seen[v] = 1;
         stack[size++] = v;
@@ -121,7 +123,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
             const int32_t u = stack[done];
             for (int32_t e = ends->first[u]; e < ends->first[u + 1]; e++) {
                 const int32_t w = tmr_other_end(s, ends->corner[e], u);
-                has_border |= s->edge_kind[ends->corner[e]] == TMR_BORDER_EDGE;
+                stays |= s->edge_kind[ends->corner[e]] & kept;
                 length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
                     seen[w] = 1;
@@ -129,7 +131,7 @@ static txm_status tmr_drop_short_creases(tmr_surface *s, const tmr_ends *ends, d
                 }
             }
         }
-        if (length >= least || has_border) continue;
+        if (length >= least || stays) continue;
         for (int32_t i = 0; i < size; i++) {
             for (int32_t e = ends->first[stack[i]]; e < ends->first[stack[i] + 1]; e++) {
                 const int32_t c = ends->corner[e];
@@ -172,7 +174,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
         kind[v] = TRIMESH_CORNER;
         if (count != 2) continue;
         const int32_t c = ends->corner[k], d = ends->corner[k + 1];
-        if (s->edge_kind[c] != s->edge_kind[d]) continue;
+        if (tmr_line_class(s->edge_kind[c]) != tmr_line_class(s->edge_kind[d])) continue;
         kind[v] = s->edge_kind[c] == TMR_BORDER_EDGE ? TRIMESH_BORDER : TRIMESH_CREASE;
         turn[v] = (float)(1 + txm_d3_dot(tmr_line_direction(s, ends, v, c, reach),
                                          tmr_line_direction(s, ends, v, d, reach)));
@@ -280,19 +282,54 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->first[id + 1] = l->segment_count;
 }
 
+/* Find creases and seams, and list the ends of the edges that stay. */
+static txm_status tmr_find_lines(tmr_surface *s, const trimesh_desc *desc, double angle,
+                                 double spacing, txm_arena *scratch, tmr_ends *ends) {
+    txm_status status;
+    if (tmr_find_creases(s, angle)) {
+        if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
+        status = tmr_drop_short_lines(s, ends, fmax(5 * spacing, 0.06), TMR_BORDER_EDGE, scratch);
+        if (status != TXM_OK) return status;
+    }
+    if (desc->seams) {
+        tmr_mark_seams(s, desc);
+        if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
+        status = tmr_drop_short_lines(s, ends, TMR_SHORTEST_SEAM * spacing,
+                                      TMR_BORDER_EDGE | TMR_CREASE_EDGE, scratch);
+        if (status != TXM_OK) return status;
+    }
+    return tmr_list_ends(s, scratch, ends);
+}
+
+/* Which vertices are on seams only? There the surface is smooth. */
+static void tmr_find_smooth(const tmr_surface *s, const tmr_ends *ends, uint8_t *smooth) {
+    for (int32_t v = 0; v < s->vertex_count; v++) {
+        int kinds = 0;
+        for (int32_t e = ends->first[v]; e < ends->first[v + 1]; e++)
+            kinds |= s->edge_kind[ends->corner[e]];
+        smooth[v] = kinds == TMR_SEAM_EDGE;
+    }
+}
+
+/* Count the edges of creases and seams for the report. */
+static void tmr_count_lines(const tmr_surface *s, trimesh_report *report) {
+    report->crease_edges = report->seam_edges = 0;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        if (!tmr_represents_edge(s, c)) continue;
+        report->crease_edges += (s->edge_kind[c] & TMR_CREASE_EDGE) != 0;
+        report->seam_edges += (s->edge_kind[c] & TMR_SEAM_EDGE) != 0;
+    }
+}
+
 /* Find all lines. spacing: the edge length of the result, which decides which creases are too short
    and which bends too slight. */
-static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, txm_arena *arena,
-                                  txm_arena *scratch, size_t *crease_edges, tmr_lines *l) {
+static txm_status tmr_lines_build(tmr_surface *s, const trimesh_desc *desc, double angle,
+                                  double spacing, txm_arena *arena, txm_arena *scratch,
+                                  trimesh_report *report, tmr_lines *l) {
     tmr_ends ends;
     const size_t n = (size_t)s->vertex_count, corners = 3 * (size_t)s->face_count;
     txm_status status;
-    if (tmr_find_creases(s, angle)) {
-        if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
-        status = tmr_drop_short_creases(s, &ends, fmax(5 * spacing, 0.06), scratch);
-        if (status != TXM_OK) return status;
-    }
-    if ((status = tmr_list_ends(s, scratch, &ends)) != TXM_OK) return status;
+    if ((status = tmr_find_lines(s, desc, angle, spacing, scratch, &ends)) != TXM_OK) return status;
     /* each edge is listed at both its ends and becomes one segment; no line is without segments */
     const size_t segments = (size_t)ends.first[s->vertex_count] / 2;
     l->line_count = l->segment_count = 0;
@@ -307,8 +344,10 @@ static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, 
     l->start = (double *)txm_arena_alloc(arena, segments + 1, sizeof(double));
     l->edge = (int32_t *)txm_arena_zero(arena, corners, sizeof(int32_t));
     l->kind = (uint8_t *)txm_arena_alloc(arena, n, 1);
+    l->smooth = (uint8_t *)txm_arena_alloc(arena, n, 1);
     l->segment = (int32_t *)txm_arena_zero(arena, n, sizeof(int32_t));
     if ((status = tmr_check_memory(arena)) != TXM_OK) return status;
+    tmr_find_smooth(s, &ends, l->smooth);
     status = tmr_find_corners(s, &ends, 0.75 * spacing, scratch, l->kind);
     if (status == TXM_OK && angle < 180)
         status = tmr_find_tips(s, 0.75 * spacing, scratch, l->kind);
@@ -320,10 +359,13 @@ static txm_status tmr_lines_build(tmr_surface *s, double angle, double spacing, 
                 if (!l->edge[ends.corner[k]]) tmr_trace(s, &ends, l, v, ends.corner[k]);
         }
     }
-    *crease_edges = 0;
-    for (int32_t i = 0; i < l->line_count; i++)
-        if (!l->border[i]) *crease_edges += (size_t)(l->first[i + 1] - l->first[i]);
+    tmr_count_lines(s, report);
     return TXM_OK;
+}
+
+/* Is segment k part of a seam where the surface is smooth? */
+static int tmr_is_smooth_segment(const tmr_lines *l, int32_t k) {
+    return l->smooth[l->a[k]] && l->smooth[l->b[k]];
 }
 
 /* the segment behind (step 1) or before (-1) segment k of its line; -1 at the end */

@@ -89,7 +89,6 @@ static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
 
 /* Mend the surface, find its lines. */
 static txm_status tmr_job_mend(trimesh_job *job) {
-    size_t crease_edges = 0;
     const float angle = job->desc.crease_angle > 0 ? job->desc.crease_angle : TMR_CREASE_ANGLE;
     txm_status status =
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
@@ -100,10 +99,9 @@ static txm_status tmr_job_mend(trimesh_job *job) {
         status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
                                  &job->scratch);
     if (status == TXM_OK)
-        status = tmr_lines_build(&job->s, angle, tmr_job_spacing(job), &job->input, &job->scratch,
-                                 &crease_edges, &job->l);
+        status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job), &job->input,
+                                 &job->scratch, &job->report, &job->l);
     if (status != TXM_OK) return status;
-    job->report.crease_edges = crease_edges;
     job->w.s = &job->s;
     job->w.l = &job->l;
     job->w.desc = &job->desc;

@@ -101,7 +101,8 @@ static txm_dvec3 tmr_normal_at(const tmr_surface *s, const tmr_lines *l, const t
     txm_dvec3 n = txm_d3(0, 0, 0);
     for (int k = 0; k < 3; k++) {
         const int32_t v = s->vertex[3 * at->face + k];
-        const int sharp = l->kind[v] == TRIMESH_CREASE || l->kind[v] == TRIMESH_CORNER;
+        const int sharp =
+            (l->kind[v] == TRIMESH_CREASE || l->kind[v] == TRIMESH_CORNER) && !l->smooth[v];
         n = txm_d3_mad(n, sharp ? s->normal[at->face] : s->vertex_normal[v], w[k]);
     }
     return txm_d3_len2(n) > 0.01 ? txm_d3_unit(n) : s->normal[at->face];

@@ -127,8 +127,12 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
 /* where vertex v lies in the caller's triangles */
 static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     const tmr_surface *s = w->s;
-    const int32_t face = tmr_face_of(w, v);
-    const tmr_place at = tmr_on_face(s, face, w->m.p[v]);
+    tmr_place at = tmr_on_face(s, tmr_face_of(w, v), w->m.p[v]);
+    if (tmr_kind_of(&w->m, v) == TRIMESH_CREASE && tmr_is_smooth_segment(w->l, w->m.source[v])) {
+        int32_t k = w->m.source[v]; /* fitting has taken it off the line */
+        const txm_dvec3 p = tmr_project_line(s, w->l, w->m.p[v], &k);
+        at = tmr_on_face(s, w->l->face[k], p);
+    }
     return tmr_surface_source(s, w->desc, &at);
 }
 

@@ -192,6 +192,13 @@ static double tmr_height_over(const tmr_work *w, int32_t face) {
     return 0.75 * txm_d3_dot(txm_d3_sub(at.p, centre), n) + 0.25 * sum / 3;
 }
 
+/* May fitting take v off the surface? Creases and borders stay where they are. */
+static int tmr_may_fit(const tmr_work *w, int32_t v) {
+    const int kind = tmr_kind_of(&w->m, v);
+    return kind == TRIMESH_FREE ||
+           (kind == TRIMESH_CREASE && tmr_is_smooth_segment(w->l, w->m.source[v]));
+}
+
 static void tmr_fit_chunk(void *context, int index) {
     tmr_work *w = (tmr_work *)context;
     const tmr_mesh *m = &w->m;
@@ -199,7 +206,7 @@ static void tmr_fit_chunk(void *context, int index) {
     const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
     for (int32_t v = from; v < to; v++) {
         tmr_keep_place(w, v);
-        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || tmr_kind_of(m, v) != TRIMESH_FREE) continue;
+        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || !tmr_may_fit(w, v)) continue;
         double sum = 0;
         int count = 0;
         int32_t c = m->corner[v];

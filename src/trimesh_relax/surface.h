@@ -5,7 +5,8 @@
 
 /* ---- the input, mended ------------------------------------------------------------------- */
 
-enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2 };
+/* Kinds of edges. A seam may be a crease as well: then both bits are set. */
+enum { TMR_PLAIN_EDGE = 0, TMR_CREASE_EDGE = 1, TMR_BORDER_EDGE = 2, TMR_SEAM_EDGE = 4 };
 
 /* An oriented manifold, perhaps with borders; does not change while points move on it. Scaled so
    that the bounding box has its centre at 0 and a diagonal of 1. */

@@ -593,7 +593,6 @@ static double tmr_points_for(const tmr_update *u) {
 
 static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     txm_env *env = u->w.env;
-    size_t crease_edges = 0;
     const float angle = u->desc.crease_angle > 0 ? u->desc.crease_angle : TMR_CREASE_ANGLE;
     trimesh_desc desc = u->desc;
     if (desc.vertices == 0) desc.vertices = u->old->vertex_count;
@@ -603,10 +602,9 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     if (u->desc.adapt > 0)
         status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
     if (status == TXM_OK)
-        status =
-            tmr_lines_build(&u->s, angle, length, &u->input, &u->scratch, &crease_edges, &u->l);
+        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch, report,
+                                 &u->l);
     if (status != TXM_OK) return status;
-    report->crease_edges = crease_edges;
     u->w.desc = &u->desc;
     u->w.s = &u->s;
     u->w.l = &u->l;

@@ -228,13 +228,9 @@ static txm_mesh_place tmr_surface_source(const tmr_surface *s, const trimesh_des
         for (int k = 0; k < 3; k++)
             weight[turn < 4 ? (k + turn) % 3 : (turn - 4 - k + 3) % 3] = own[k];
     } else {
-        const uint32_t *i = desc->surface.indices + 3 * (size_t)source.triangle;
         txm_dvec3 p[3];
         int part;
-        for (int k = 0; k < 3; k++) {
-            const float *q = desc->surface.positions + 3 * (size_t)i[k];
-            p[k] = txm_d3_scale(txm_d3_sub(txm_d3(q[0], q[1], q[2]), s->centre), 1 / s->diagonal);
-        }
+        tmr_caller_corners(s, desc, source.triangle, p);
         tmr_nearest(at->p, p[0], p[1], p[2], &weight[1], &weight[2], &part);
     }
     source.u = txm_clampf(txm_float(weight[1]), 0, 1);
