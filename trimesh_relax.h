@@ -4,8 +4,8 @@
    WHAT IT DOES
      Takes a triangle mesh of any shape and quality and covers the same surface with a given number
      of vertices whose triangles are as equilateral and equal as the surface allows: a closed or
-     bordered manifold of the same topology, with creases, borders and (if given) seams preserved. Such triangles are
-     easy to texture: see trimesh_cover.h.
+     bordered manifold of the same topology, with creases, borders and (if given) seams preserved.
+     Such triangles are easy to texture: see trimesh_cover.h.
 
    QUICK START                                 (tests build and run this very block)
      // Cover a tetrahedron-like pebble with 500 vertices. cc -std=c99 quick.c -lm

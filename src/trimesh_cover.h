@@ -145,6 +145,8 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
    From the middle another such path leads to each corner, and ends where it meets a seam: a corner
    beyond the seam takes the value at that place. So along a seam charts end up to a triangle early or
    late, depending on the triangles; values are never interpolated across a seam.
+   A source that lies on a seam, as where the mesh follows it (`seams` of trimesh_relax.h), is on both
+   sides of it: the corner takes the value of its triangle's side, exactly.
 
                chart 1    s   chart 2
                +----------s------+          m middle, in chart 1; s the seam
@@ -157,7 +159,7 @@ TRIMESH_COVER_API txm_status trimesh_transfer(const txm_mesh *input, const trime
    sources  1 per vertex of mesh
    out      channels floats per corner, 3 corners per triangle, in the order of mesh->indices
    cost     O(input) for the neighbours, then for each triangle of mesh as many steps as input
-            triangles lie on its paths; 75 bytes per triangle of the input, 20 per vertex       */
+            triangles lie on its paths; 79 bytes per triangle of the input, 20 per vertex       */
 TRIMESH_COVER_API txm_status trimesh_transfer_corners(const txm_mesh *input,
                                                       const trimesh_values *values,
                                                       const txm_mesh *mesh,

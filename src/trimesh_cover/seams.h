@@ -15,6 +15,7 @@ typedef struct tmc_paths {
     uint32_t *vertex; /* 1 per corner: its welded vertex                                   */
     uint32_t *next;   /* 1 per side, see txm_mesh_link                                     */
     uint8_t *seam;    /* 1 per side: 0 = none, 1 = seam, 2 = none or several on the other side */
+    uint32_t *chart;  /* 1 per triangle: a triangle of its chart, the same for all of a chart  */
     float *out;
 } tmc_paths;
 
@@ -69,6 +70,25 @@ static uint8_t tmc_seam(const tmc_paths *p, size_t side) {
              tmc_equal_values(&p->values, txm_mesh_next(&p->input, side), b));
 }
 
+/* The first triangle of the chart that t is in so far; shortens the way there. */
+static uint32_t tmc_chart(uint32_t *chart, uint32_t t) {
+    while (chart[t] != t) t = chart[t] = chart[chart[t]];
+    return t;
+}
+
+/* Charts: triangles that are joined by sides without seams. */
+static void tmc_find_charts(tmc_paths *p) {
+    const size_t n = p->input.face_count;
+    for (size_t t = 0; t < n; t++) p->chart[t] = (uint32_t)t;
+    for (size_t side = 0; side < 3 * n; side++) {
+        if (p->seam[side]) continue;
+        const uint32_t a = tmc_chart(p->chart, (uint32_t)(side / 3));
+        const uint32_t b = tmc_chart(p->chart, p->next[side] / 3);
+        p->chart[a > b ? a : b] = a > b ? b : a;
+    }
+    for (size_t t = 0; t < n; t++) p->chart[t] = tmc_chart(p->chart, (uint32_t)t);
+}
+
 static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) {
     const size_t n = p->input.vertex_count, sides = 3 * p->input.face_count;
     txm_arena scratch;
@@ -77,6 +97,7 @@ static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) 
     p->vertex = (uint32_t *)txm_arena_alloc(arena, sides, sizeof(uint32_t));
     p->next = (uint32_t *)txm_arena_alloc(arena, sides, sizeof(uint32_t));
     p->seam = (uint8_t *)txm_arena_alloc(arena, sides, 1);
+    p->chart = (uint32_t *)txm_arena_alloc(arena, p->input.face_count, sizeof(uint32_t));
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(&scratch, n, 2 * sizeof(txm_pair));
     txm_status status = tmc_check_memory(arena, env);
     if (status == TXM_OK) status = tmc_check_memory(&scratch, env);
@@ -88,7 +109,109 @@ static txm_status tmc_paths_build(tmc_paths *p, txm_arena *arena, txm_env *env) 
     whole.indices = p->vertex;
     if ((status = tmc_link(&whole, env, p->next)) != TXM_OK) return status;
     for (size_t i = 0; i < sides; i++) p->seam[i] = tmc_seam(p, i);
+    tmc_find_charts(p);
     return TXM_OK;
+}
+
+/* ---- attributes: places on seams ------------------------------------------------------------- */
+
+enum { TMC_MOST_SPOTS = 64 }; /* ours: triangles around a vertex that are looked at          */
+
+/* A place on the input as all triangles there have it: one inside a triangle, two on a side, those
+   around a vertex. The first is the place that was given. */
+typedef struct tmc_spots {
+    tmc_place at[TMC_MOST_SPOTS];
+    size_t count;
+    int on_seam; /* is there a seam between two of them? */
+} tmc_spots;
+
+/* the place at corner k of a triangle */
+static tmc_place tmc_at_corner(size_t corner) {
+    tmc_place at;
+    at.triangle = corner / 3;
+    at.u = corner % 3 == 1 ? 1 : 0;
+    at.v = corner % 3 == 2 ? 1 : 0;
+    return at;
+}
+
+/* the corner at this vertex of the triangle that a side belongs to */
+static size_t tmc_corner_of(const tmc_paths *p, size_t side, uint32_t vertex) {
+    const size_t next = txm_mesh_next(&p->input, side);
+    return p->vertex[side] == vertex ? side : p->vertex[next] == vertex ? next
+                                                                       : txm_mesh_next(&p->input, next);
+}
+
+/* Add the triangles around the vertex of a corner, first counter-clockwise, then the other way. */
+static void tmc_spots_around(const tmc_paths *p, size_t corner, tmc_spots *s) {
+    const uint32_t vertex = p->vertex[corner];
+    for (int back = 0; back < 2; back++) {
+        size_t c = corner, side = back ? corner : txm_mesh_next(&p->input, txm_mesh_next(&p->input, corner));
+        while (p->seam[side] != 2 && s->count < TMC_MOST_SPOTS) {
+            s->on_seam |= p->seam[side];
+            const size_t other = p->next[side];
+            c = tmc_corner_of(p, other, vertex);
+            if (c / 3 == corner / 3) return; /* all around */
+            s->at[s->count++] = tmc_at_corner(c);
+            /* leave by the other one of the two sides at the vertex */
+            side = other == c ? txm_mesh_next(&p->input, txm_mesh_next(&p->input, c)) : c;
+        }
+    }
+}
+
+/* All triangles at a place. */
+static void tmc_find_spots(const tmc_paths *p, tmc_place at, tmc_spots *s) {
+    const double w[3] = {1 - at.u - at.v, at.u, at.v};
+    size_t zeros = 0, zero = 0, whole = 0;
+    s->at[0] = at;
+    s->count = 1;
+    s->on_seam = 0;
+    for (size_t k = 0; k < 3; k++) {
+        if (w[k] <= TMC_SNAP) {
+            zeros++;
+            zero = k;
+        } else whole = k;
+    }
+    if (zeros == 2) tmc_spots_around(p, 3 * at.triangle + whole, s);
+    if (zeros != 1) return;
+    const size_t side = 3 * at.triangle + (zero + 1) % 3; /* from corner k + 1 to k + 2 */
+    if (p->seam[side] == 2) return;
+    const size_t other = p->next[side], next = txm_mesh_next(&p->input, other);
+    double weight[3] = {0, 0, 0};
+    const int alike = p->vertex[other] == p->vertex[side];
+    weight[(alike ? other : next) % 3] = w[(zero + 1) % 3];
+    weight[(alike ? next : other) % 3] = w[(zero + 2) % 3];
+    s->at[1].triangle = other / 3;
+    s->at[1].u = weight[1];
+    s->at[1].v = weight[2];
+    s->count = 2;
+    s->on_seam = p->seam[side];
+}
+
+/* Which of the spots lies in the chart? -1: none. */
+static int tmc_spot_in_chart(const tmc_paths *p, const tmc_spots *s, uint32_t chart) {
+    for (size_t i = 0; i < s->count; i++) {
+        if (p->chart[s->at[i].triangle] == chart) return (int)i;
+    }
+    return -1;
+}
+
+/* Of the spots that lie in the chart of `at`, the one whose values are nearest to those there: where a
+   chart is cut, both sides of the cut lie in it. 0: none lies in it. */
+static int tmc_nearest_spot(const tmc_paths *p, const tmc_spots *s, tmc_place at, tmc_place *spot) {
+    float here[TRIMESH_MAX_CHANNELS], there[TRIMESH_MAX_CHANNELS];
+    double least = -1;
+    tmc_interpolate(&p->values, at.triangle, at.u, at.v, here);
+    for (size_t i = 0; i < s->count; i++) {
+        double sum = 0;
+        if (p->chart[s->at[i].triangle] != p->chart[at.triangle]) continue;
+        tmc_interpolate(&p->values, s->at[i].triangle, s->at[i].u, s->at[i].v, there);
+        for (size_t k = 0; k < p->values.channels; k++)
+            sum += ((double)here[k] - there[k]) * ((double)here[k] - there[k]);
+        if (least >= 0 && sum >= least) continue;
+        least = sum;
+        *spot = s->at[i];
+    }
+    return least >= 0;
 }
 
 /* A path: from `start` towards `end` in the plane through both along `up`. */
@@ -197,9 +320,30 @@ static tmc_path tmc_path_make(const tmc_paths *p, tmc_place *at, txm_dvec3 end, 
     return w;
 }
 
+/* If the chart of the middle is not one that all three corners have, but another is, as where a seam
+   bends between two corners on it, take that one: its place at the first corner, moved inwards by the
+   path to the middle. */
+static void tmc_choose_chart(const tmc_paths *p, const tmc_spots spots[3], tmc_place *middle) {
+    size_t first = 0;
+    for (size_t k = 1; k < 3; k++)
+        if (spots[k].count < spots[first].count) first = k;
+    const tmc_spots *s = &spots[first];
+    int found = -1;
+    for (size_t i = 0; i < s->count; i++) {
+        const uint32_t chart = p->chart[s->at[i].triangle];
+        if (tmc_spot_in_chart(p, &spots[(first + 1) % 3], chart) < 0 ||
+            tmc_spot_in_chart(p, &spots[(first + 2) % 3], chart) < 0)
+            continue;
+        if (chart == p->chart[middle->triangle]) return;
+        if (found < 0) found = (int)i;
+    }
+    if (found >= 0) *middle = s->at[found];
+}
+
 /* The values at the corners of one triangle of the mesh. */
 static void tmc_transfer_face(const tmc_paths *p, size_t t) {
     tmc_place from[3];
+    tmc_spots spots[3];
     txm_dvec3 c[3];
     for (size_t k = 0; k < 3; k++) {
         const txm_mesh_place *s = &p->sources[p->mesh->indices[3 * t + k]];
@@ -207,16 +351,19 @@ static void tmc_transfer_face(const tmc_paths *p, size_t t) {
         from[k].u = s->u;
         from[k].v = s->v;
         c[k] = tmc_point(&p->input, from[k]);
+        tmc_find_spots(p, from[k], &spots[k]);
     }
     const txm_dvec3 up = txm_d3_unit(txm_d3_area2(c[0], c[1], c[2]));
     const txm_dvec3 middle = txm_d3_scale(txm_d3_add(txm_d3_add(c[0], c[1]), c[2]), 1.0 / 3);
     tmc_place centre = from[0];
     const tmc_path way = tmc_path_make(p, &centre, middle, up, SIZE_MAX, 1);
     if (way.reach > 0) tmc_walk(p, &way, &centre);
+    tmc_choose_chart(p, spots, &centre);
     for (size_t k = 0; k < 3; k++) {
         tmc_place at = centre;
         const tmc_path w = tmc_path_make(p, &at, c[k], up, from[k].triangle, 0);
         if (tmc_walk(p, &w, &at)) at = from[k];
+        else if (spots[k].on_seam) tmc_nearest_spot(p, &spots[k], at, &at);
         tmc_interpolate(&p->values, at.triangle, at.u, at.v,
                         p->out + p->values.channels * (3 * t + k));
     }

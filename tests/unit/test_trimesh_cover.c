@@ -156,6 +156,109 @@ static void test_transfer_corners(void **state) {
     shape_free(&fine);
 }
 
+/* A mesh that follows the seams: then every triangle has the values of its own side, exactly. `how`: charts
+   of 3 x 3 quads; one chart, cut along one column; a fan around every vertex of one row, as at the pole
+   of a globe; a chart for every triangle. */
+static void test_transfer_along_seams(void **state) {
+    enum { COLUMNS = 12, ROWS = 9 };
+    shape s;
+    (void)state;
+    make_plane(&s, COLUMNS, ROWS);
+    const size_t corners = 3 * s.triangles;
+    txm_mesh_place *sources = (txm_mesh_place *)malloc(s.vertices * sizeof *sources);
+    float *value = (float *)malloc(2 * corners * sizeof(float));
+    float *out = (float *)malloc(2 * corners * sizeof(float));
+    uint32_t *entry = (uint32_t *)malloc(corners * sizeof(uint32_t));
+    const trimesh_values values = {value, corners, entry, 2};
+    for (size_t c = 0; c < corners; c++) entry[c] = (uint32_t)c;
+    for (int how = 0; how < 4; how++) {
+        for (size_t c = 0; c < corners; c++) {
+            const float *p = s.positions + 3 * s.indices[c];
+            const size_t column = c / 6 % COLUMNS, row = c / 6 / COLUMNS;
+            float step = 0;
+            if (how == 0) step = (float)(100 * (column / 3) + 1000 * (row / 3));
+            if (how == 1) step = column >= 6 && row >= 3 ? 100.0f : 0.0f;
+            if (how == 2) step = (float)(20 * (c / 3 % 5)) * (row == 4 ? 1.0f : 0.0f);
+            if (how == 3) step = (float)(20 * (c / 3));
+            value[2 * c] = p[0] + step;
+            value[2 * c + 1] = p[1];
+        }
+        for (int last = 0; last < 2; last++) { /* sources name the first or the last triangle there */
+            for (size_t i = 0; i < corners; i++) {
+                const size_t c = last ? i : corners - 1 - i;
+                txm_mesh_place *o = &sources[s.indices[c]];
+                o->triangle = (uint32_t)(c / 3);
+                o->u = c % 3 == 1;
+                o->v = c % 3 == 2;
+            }
+            assert_int_equal(trimesh_transfer_corners(&s.view, &values, &s.view, sources, NULL, out),
+                             TXM_OK);
+            for (size_t i = 0; i < 2 * corners; i++) assert_float_equal(out[i], value[i], 1e-3);
+        }
+    }
+    free(entry);
+    free(out);
+    free(value);
+    free(sources);
+    shape_free(&s);
+}
+
+/* Sources in the middle of sides, where two charts meet: triangles cut in four. */
+static void test_transfer_on_sides(void **state) {
+    enum { N = 6 };
+    shape s, fine;
+    (void)state;
+    make_plane(&s, N, N);
+    const size_t corners = 3 * s.triangles;
+    shape_alloc(&fine, corners * 2, 4 * s.triangles); /* a corner and a middle, for each corner */
+    txm_mesh_place *sources = (txm_mesh_place *)malloc(2 * corners * sizeof *sources);
+    float *value = (float *)malloc(2 * corners * sizeof(float));
+    float *out = (float *)malloc(8 * corners * sizeof(float));
+    uint32_t *entry = (uint32_t *)malloc(corners * sizeof(uint32_t));
+    const trimesh_values values = {value, corners, entry, 2};
+    for (size_t c = 0; c < corners; c++) {
+        const float *p = s.positions + 3 * s.indices[c];
+        const size_t next = c % 3 == 2 ? c - 2 : c + 1;
+        const float at[2][2] = {{(float)(c % 3 == 1), (float)(c % 3 == 2)},
+                                {0.5f * (float)(c % 3 != 2), 0.5f * (float)(c % 3 != 0)}};
+        entry[c] = (uint32_t)c;
+        value[2 * c] = p[0] + (float)(100 * (c / 3));
+        value[2 * c + 1] = p[1];
+        for (size_t k = 0; k < 2; k++) {
+            sources[2 * c + k].triangle = (uint32_t)(c / 3);
+            sources[2 * c + k].u = at[k][0];
+            sources[2 * c + k].v = at[k][1];
+        }
+        for (size_t other = 0; other < c; other++) { /* the middle as the other triangle has it */
+            const size_t end = other % 3 == 2 ? other - 2 : other + 1;
+            if (s.indices[other] != s.indices[next] || s.indices[end] != s.indices[c]) continue;
+            sources[2 * c + 1] = sources[2 * other + 1];
+        }
+    }
+    for (size_t t = 0; t < s.triangles; t++) {
+        const size_t c = 6 * t;
+        face(&fine, 4 * t, c, c + 1, c + 5);
+        face(&fine, 4 * t + 1, c + 1, c + 2, c + 3);
+        face(&fine, 4 * t + 2, c + 5, c + 3, c + 4);
+        face(&fine, 4 * t + 3, c + 1, c + 3, c + 5);
+    }
+    assert_int_equal(trimesh_transfer_corners(&s.view, &values, &fine.view, sources, NULL, out), TXM_OK);
+    for (size_t i = 0; i < 3 * fine.triangles; i++) {
+        const size_t t = i / 12, k = fine.indices[i] - 6 * t, c = 3 * t + k / 2;
+        const size_t next = k / 2 == 2 ? 3 * t : c + 1;
+        for (size_t x = 0; x < 2; x++) {
+            const float want = k % 2 ? 0.5f * (value[2 * c + x] + value[2 * next + x]) : value[2 * c + x];
+            assert_float_equal(out[2 * i + x], want, 1e-3);
+        }
+    }
+    free(entry);
+    free(out);
+    free(value);
+    free(sources);
+    shape_free(&fine);
+    shape_free(&s);
+}
+
 /* The input retiled by itself: every source lies in a corner of a triangle, the hardest place. */
 static void test_transfer_identity(void **state) {
     shape s;
@@ -525,6 +628,8 @@ int main(void) {
         cmocka_unit_test(test_normals),
         cmocka_unit_test(test_transfer),
         cmocka_unit_test(test_transfer_corners),
+        cmocka_unit_test(test_transfer_along_seams),
+        cmocka_unit_test(test_transfer_on_sides),
         cmocka_unit_test(test_transfer_identity),
         cmocka_unit_test(test_split),
         cmocka_unit_test(test_atlas),
