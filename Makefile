@@ -94,7 +94,7 @@ $(BUILD)/shape: $(BUILD)/helpers/shape.o
 	$(LINK) $^ -o $@ -lm
 
 $(BUILD)/view: $(addprefix $(BUILD)/helpers/,view.o render.o) $(MESHES) $(IMAGES)
-	$(LINK) $^ -o $@ $(PICTURES) -lm
+	$(LINK) $^ -o $@ -lcjson $(PICTURES) -lm
 
 # ---- examples and benchmarks
 
@@ -102,12 +102,12 @@ examples: $(EXAMPLES)
 
 $(BUILD)/examples/%: examples/%.c $(BUILD)/files/stb.o $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/mesh.o,$^),-lcjson) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
 
 # those of more than one file have a folder of their own
 $(BUILD)/examples/%: examples/%/main.c $(BUILD)/files/stb.o $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
+	$(COMPILE) $(filter %.c %.o,$^) -o $@ $(LIBRARIES) $(if $(filter %/mesh.o,$^),-lcjson) $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
 
 $(BUILD)/examples/membrane: $(wildcard examples/membrane/*)
 $(BUILD)/examples/terrain: $(wildcard examples/terrain/*)
@@ -128,13 +128,13 @@ bench: $(BENCHES) $(PLAIN) samples
 
 $(BUILD)/bench/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
-	$(COMPILE) $< $(filter %.o,$^) -o $@ $(PICTURES) -lm
+	$(COMPILE) $< $(filter %.o,$^) -o $@ $(if $(filter %/mesh.o,$^),-lcjson) $(PICTURES) -lm
 
 # the same without SIMD, for comparison
 $(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD -DTEXINPAINT_NO_SIMD \
-	    $< $(filter %.o,$^) -o $@ $(PICTURES) -lm
+	    $< $(filter %.o,$^) -o $@ $(if $(filter %/mesh.o,$^),-lcjson) $(PICTURES) -lm
 
 $(BUILD)/bench/bench_inpaint $(BUILD)/bench/plain/bench_inpaint: $(MESHES)
 

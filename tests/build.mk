@@ -55,7 +55,7 @@ $(TESTS)/unit/%.o: tests/unit/%.c tests/build.mk
 	$(TEST_C) $(SANITIZE) $(if $(strip $(call inside,$<)),-Wno-unused-function,-O0) -c $< -o $@
 
 $(TESTS)/unit/%: $(TESTS)/unit/%.o
-	$(CC) $(SANITIZE) $^ -o $@ -lcmocka -lpthread $(if $(filter %/image_io.o,$^),$(PICTURES)) -lm
+	$(CC) $(SANITIZE) $^ -o $@ -lcmocka -lpthread $(if $(filter %/image_io.o,$^),-lcjson $(PICTURES)) -lm
 
 # links.mk says which objects a unit test is linked with: those of the headers that it includes,
 # itself or by way of the kit, but for modules whose implementation it holds to see what is private

@@ -117,6 +117,40 @@ for from in torus.obj cube.obj colored.ply; do
         esac
     done
 done
+# other formats: the same torus without texture coordinates
+awk '/^v / { print } /^f / { printf "f"; for (i = 2; i <= 5; i++) printf " %d", $i; print "" }' torus.obj >bare.obj
+awk '/^v / { v[n++] = $2 " " $3 " " $4 } /^f / { f[m++] = "4 " $2 - 1 " " $3 - 1 " " $4 - 1 " " $5 - 1 }
+    END { print "OFF # made by a test\n" n, m, 0; for (i = 0; i < n; i++) print v[i]
+        for (i = 0; i < m; i++) print f[i] }' bare.obj >torus.off
+check "a mesh as .off" run 0 torus.off -o off.obj --vertices 300
+check "gives the same as the .obj" sh -c "'$texkit' retile bare.obj -o bare-out.obj --vertices 300 --quiet &&
+    cmp bare-out.obj off.obj"
+check "to .stl" run 0 torus.off -o torus.stl --vertices 300 --stats stats.json
+check "whose size tells the triangles" test "$(wc -c <torus.stl)" = $((84 + 50 * $(figure triangles)))
+check "from .stl" run 0 torus.stl -o stl.ply --vertices 200 --stats stats.json
+check "it is one closed piece" figures vertices=200 euler=0 components=1 loops=0
+check "from .glb" run 0 out-torus.glb -o glb.ply --vertices 200 --stats stats.json
+check "it is one closed piece, too" figures vertices=200 euler=0 components=1 loops=0
+check "an .stl holds no texture coordinates" warns "will hold no texture coordinates" retile torus.obj \
+    -o t.stl --vertices 100
+check "nor colors" warns "will hold no colors" retile colored.ply -o t.stl --vertices 100
+refuses 2 "holds no texture; name one" torus.obj -o t.stl --vertices 100 --texture torus.obj
+check "faces of two corners are left out" sh -c "cp bare.obj two.obj && echo 'f 1 2' >>two.obj"
+check "with a warning" warns "left out: faces with less than three corners (1)" retile two.obj -o two-out.obj \
+    --vertices 300
+check "and nothing else changes" cmp two-out.obj bare-out.obj
+
+# a mesh in map coordinates is retiled as the same one at the origin
+away=5400000.125
+awk -v away=$away '/^v / { printf "v %.6f %.6f %.6f\n", $2 + away, $3 + 455000, $4; next } { print }' bare.obj >away.obj
+for to in obj ply stl glb; do
+    check "far away, as .$to" run 0 away.obj -o away-out.$to --vertices 300 --stats stats.json
+    check "as good" sh -c "awk 'BEGIN { exit !($(figure quality) > 0.97 && $(figure valence_6) > 0.7) }'"
+    check "and again" run 0 away-out.$to -o again.obj --vertices 300 --stats stats.json
+    check "closed" figures vertices=300 euler=0 loops=0
+    check "where it was" awk -v away=$away '/^v / { x = $2 - away; y = $3 - 455000; d = sqrt(x * x + y * y) - 1
+        d = sqrt(d * d + $4 * $4) - 0.4; if (d * d > 0.05 * 0.05) exit 1; n++ } END { exit n != 300 }' again.obj
+done
 check "the torus: Euler characteristic 0" run 0 torus.obj -o t.ply --vertices 301 --stats stats.json
 check "and its other figures" figures command=\"retile\" vertices=301 triangles=602 euler=0 \
     components=1 loops=0 crease_edges=0 "mended=[0, 0, 0, 0, 0, 0, 0]"
@@ -270,7 +304,7 @@ refuses 2 ""
 refuses 2 "add -o" torus.obj --vertices 100
 refuses 2 "add --vertices" torus.obj -o n.obj
 for bad in 0 3 -1 x 1.5 "" 99999999999; do refuses 2 "--vertices" torus.obj -o n.obj --vertices "$bad"; done
-for name in n.stl n.txs n n.png n.gltf; do refuses 2 "cannot write '$name'" torus.obj -o $name --vertices 100; done
+for name in n.dae n.txs n n.png n.gltf; do refuses 2 "cannot write '$name'" torus.obj -o $name --vertices 100; done
 refuses 2 "lattice, repel" torus.obj -o n.obj --vertices 100 --method magic
 for bad in 0 181 x -5; do refuses 2 "--crease" torus.obj -o n.obj --vertices 100 --crease $bad; done
 for bad in -1 101 x; do refuses 2 "--adapt" torus.obj -o n.obj --vertices 100 --adapt $bad; done

@@ -9,62 +9,7 @@
 
 #include <cmocka.h>
 
-#include "files/mesh_io.h"
-
-#include <stdio.h>
-
-/* ---- helpers ------------------------------------------------------------------------------- */
-
-/* An exact copy on the heap, so that the sanitizer sees any read beyond it. */
-static int decode(const void *bytes, size_t size, int points_too, mesh_data *mesh,
-                  const char **why) {
-    unsigned char *copy = (unsigned char *)malloc(size ? size : 1);
-    assert_non_null(copy);
-    if (size) memcpy(copy, bytes, size);
-    *why = NULL;
-    const int ok = mesh_decode(copy, size, points_too, mesh, why);
-    free(copy);
-    if (!ok) { /* one line that says why, and nothing left behind */
-        assert_non_null(*why);
-        assert_true((*why)[0] != 0 && strchr(*why, '\n') == NULL);
-        assert_null(mesh->positions);
-        assert_null(mesh->indices);
-        assert_int_equal(mesh->vertex_count, 0);
-    }
-    return ok;
-}
-
-static void read_text(const char *text, mesh_data *mesh) {
-    const char *why;
-    if (!decode(text, strlen(text), 0, mesh, &why)) fail_msg("%s", why);
-}
-
-static void assert_fails(const char *text, const char *expected) {
-    mesh_data mesh;
-    const char *why;
-    assert_false(decode(text, strlen(text), 0, &mesh, &why));
-    assert_string_equal(why, expected);
-}
-
-static void assert_indices(const mesh_data *mesh, const uint32_t *indices, size_t triangles) {
-    assert_int_equal(mesh->triangle_count, triangles);
-    assert_memory_equal(mesh->indices, indices, 3 * triangles * sizeof *indices);
-}
-
-/* Twice the area of all triangles of a mesh in the plane z = 0, those clockwise taken off. */
-static double flat_area2(const mesh_data *m) {
-    double sum = 0;
-    for (size_t t = 0; t < m->triangle_count; t++) {
-        const float *a = m->positions + 3 * (size_t)m->indices[3 * t];
-        const float *b = m->positions + 3 * (size_t)m->indices[3 * t + 1];
-        const float *c = m->positions + 3 * (size_t)m->indices[3 * t + 2];
-        const double area2 = (double)(b[0] - a[0]) * (double)(c[1] - a[1]) -
-                             (double)(b[1] - a[1]) * (double)(c[0] - a[0]);
-        assert_true(area2 >= 0);
-        sum += area2;
-    }
-    return sum;
-}
+#include "meshkit.h"
 
 /* ---- OBJ ----------------------------------------------------------------------------------- */
 
@@ -180,7 +125,7 @@ static void obj_says_what_is_wrong(void **state) {
     (void)state;
     const char *range = "line 2: a face with an index that is out of range or no number";
     assert_fails("", "the file is empty");
-    assert_fails("hello\nworld", "no vertices in it; give an OBJ or PLY file");
+    assert_fails("hello\nworld", "no vertices in it; give an OBJ, PLY, STL, OFF or GLB file");
     assert_fails("\xff\xfev", "its text is in UTF-16; save it in UTF-8");
     assert_fails("v 0 0 0\n", "no faces in it");
     assert_fails("v 0 0\n", "line 1: a vertex has less than three coordinates");
@@ -206,7 +151,6 @@ static void obj_says_what_is_wrong(void **state) {
     assert_fails("v 0 0 0 \\\n\nf 1 1 2", "line 3: a face with vertex 2, but there are only 1");
     assert_fails("v 0 0 0\nf 1/1 1/1 1/1",
                  "line 2: a face with texture vertex 1, but there are only 0");
-    assert_fails("glTFxxxx", "glTF is only written, not read; convert it to OBJ or PLY");
 }
 
 /* What other programs write, and what does no harm, is read and told in one line. */

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The mesh reader against hostile bytes: some ten thousands of mutations here, a million with --full.
+# The mesh readers against hostile bytes: some ten thousands of mutations here, a million with --full.
 . tests/kit/tap.sh
 
 mkdir "$tmp/seeds"
@@ -65,8 +65,57 @@ end_header
 1 0 0 1 0 0 0
 0.5 0.75 0 0 0.5 0 0.5
 END
+cat >"$tmp/seeds/text.stl" <<'END'
+solid two
+facet normal 0 0 1
+ outer loop
+  vertex 0 0 0
+  vertex 1.5 0 0
+  vertex 0 1e0 0
+ endloop
+endfacet
+facet normal 0 0 1
+ outer loop
+  vertex 1.5 0 0
+  vertex 455001,25 5.4D6 0
+  vertex 0 1 0
+ endloop
+endfacet
+endsolid two
+END
+cat >"$tmp/seeds/all.off" <<'END'
+STCNOFF # all that there is
+5 3 0
 
-with="tools/files/*.c" libraries="-lpng -lz -ljpeg -lm"
+0 0 0  0 0 1  1 0 0 1  0 0
+1 0 0  0 0 1  0 1 0 1  1 0
+1 1 0  0 0 1  0 0 1 1  1 1 # a corner
+0 1 0  0 0 1  1 1 1 1  0 1
+0.5 0.5 1  0 0 1  1 1 1 1  0 1
+4 0 1 2 3  255 0 0
+3 0 1 4
+2 1 2
+END
+cat >"$tmp/seeds/strips.ply" <<'END'
+ply
+format ascii 1.0
+element vertex 6
+property double x
+property double y
+property double z
+element tristrips 1
+property list int int64 vertex_indices
+end_header
+455001 5400000 210
+455002 5400000 210
+455001 5400001 210
+455002 5400001 210
+455001 5400002 210
+455002 5400002 210.5
+8 0 1 2 3 -1 2 3 4
+END
+
+with="tools/files/*.c" libraries="-lcjson -lpng -lz -ljpeg -lm"
 runs=30000
 [ "$FULL" = 1 ] && runs=300000
 # shellcheck disable=SC2086 # flags are words, files a pattern

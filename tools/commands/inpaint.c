@@ -14,7 +14,7 @@ static const cli_manual inpaint_manual = {
     "pixel changes, but for the gutters of holes. OUT ends in .png, .jpg, .tif,\n"
     ".webp, .tga or .bmp and has the channels of the picture; .png and .tif keep 16 bits.\n"
     "Pictures and masks have the same size.\n"
-    "--mesh completes on the surface of MESH, an OBJ or PLY file with texture coordinates, across\n"
+    "--mesh completes on the surface of MESH, an OBJ, PLY or GLB with texture coordinates, across\n"
     "  the seams of its texture; vertices at equal positions count as one.\n"
     "--maps M1,M2 are pictures in register, completed from the same pieces. Each is named after\n"
     "  the part of its name that the picture's lacks: cow-normal.png becomes OUT-normal.png.\n"

@@ -11,9 +11,9 @@
 static const cli_manual retile_manual = {
     "retile", "MESH -o OUT --vertices N [options]",
     "cover a surface with near-equilateral triangles",
-    "MESH is an OBJ or PLY file; small faults are repaired (equal vertices welded, triangles\n"
-    "oriented consistently, fins removed). OUT ends in .obj, .ply or .glb; it has exactly N\n"
-    "vertices, not counting copies along texture seams. Texture coordinates and colors of\n"
+    "MESH is an OBJ, PLY, STL, OFF or GLB file; small faults are repaired (equal vertices welded,\n"
+    "triangles oriented consistently, fins removed). OUT ends in .obj, .ply, .stl or .glb; it has\n"
+    "exactly N vertices, not counting copies along texture seams. Texture coordinates and colors of\n"
     "MESH are carried over, unless one of these options textures the triangles:\n"
     "--tiles DIR names a set of 'texkit tiles --kind triangle': every triangle gets a tile\n"
     "  whose edges match those of its neighbours.\n"
@@ -57,6 +57,8 @@ static int check_options(retile_job *j, const char *method) {
     if (has_picture && j->instances && strcmp(j->extension, ".glb") != 0)
         return cli_fail(run, CLI_USAGE, "--instances with a texture needs an OUT in .glb; it holds "
                         "both");
+    if (has_picture && !strcmp(j->extension, ".stl"))
+        return cli_fail(run, CLI_USAGE, "an OUT in .stl holds no texture; name one in .obj, .ply or .glb");
     int status = CLI_DONE;
     if (has_picture && !(run->to_stdout && !strcmp(j->extension, ".glb"))) /* which contains it */
         status = path_beside(run, j->texture ? "-texture.png" : "-atlas.png", j->png_path);
@@ -73,6 +75,15 @@ static int read_mesh(retile_job *j, const char *path, int flags, mesh_data *mesh
         return cli_fail(&j->run, CLI_FAILED, "cannot read '%s': %s", path, why);
     if (mesh->note[0]) cli_warn(&j->run, "'%s': %s", path, mesh->note);
     return CLI_DONE;
+}
+
+/* An STL holds triangles only. */
+static void warn_of_stl(retile_job *j) {
+    const mesh_data *m = &j->input;
+    if (strcmp(j->extension, ".stl") != 0 || (!m->colors && !m->uvs)) return;
+    cli_warn(&j->run, "'%s' will hold no %s%s%s; .obj, .ply and .glb do", j->run.output,
+             m->colors ? "colors" : "", m->colors && m->uvs ? " and no " : "",
+             m->uvs ? "texture coordinates" : "");
 }
 
 /* Scales of edge lengths from a picture on the input's texture coordinates: 1 where it is black,
@@ -252,6 +263,7 @@ static int run_job(retile_job *j, int argc, char **argv) {
     status = read_mesh(j, j->run.inputs[0], 0, &j->input);
     if (!status && j->instances) /* it lies on a triangle between 0 and 1 */
         status = read_mesh(j, j->instances, MESH_POINTS | MESH_UNMOVED, &j->patch);
+    if (!status) warn_of_stl(j);
     if (!status) status = retile(j);
     if (!status) status = retile_dress(j);
     if (!status) {

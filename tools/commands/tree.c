@@ -17,7 +17,7 @@ static const cli_manual tree_manual = {
     "  .glb  one mesh on a skeleton with a joint for every piece, and with --wind an\n"
     "        animation of its swaying that loops seamlessly\n"
     "  .obj  a mesh with its pictures beside it; the bark is one closed surface\n"
-    "  .ply  the same mesh with colors, without pictures\n"
+    "  .ply  the same mesh with colors, without pictures; .stl, without colors as well\n"
     "  .txt  the species itself, to edit and pass to --species (see docs/trees.md)\n"
     "Species: oak, beech, maple, birch, poplar, willow, almond, pine, spruce, dead.\n"
     "Each --seed gives a different tree. --bones gives the thinnest twigs no joints of their\n"
@@ -36,7 +36,7 @@ static const cli_manual forest_manual = {
     "        nodes, plus one for each species with leaves after the third, for any number\n"
     "        of trees\n"
     "  .obj  every tree as a mesh, with the pictures beside it\n"
-    "  .ply  the same with colors, without pictures\n"
+    "  .ply  the same with colors, without pictures; .stl, without colors as well\n"
     "In glTF instances cannot have skeletons: the pieces in a .glb are rigid and overlap a\n"
     "little where a branch bends. 'texkit tree' writes one tree that can move. All\n"
     "instances of a piece show the same bark tiles.\n",
@@ -162,20 +162,20 @@ static void add_part(built *b, const mesh_data *mesh, const mesh_material *mater
     b->parts[b->scene.part_count++].material = material;
 }
 
-/* All trees in their final pose; for a .ply all in one mesh. */
+/* All trees in their final pose; without textures all in one mesh. */
 static int build_baked(tree_job *j, built *b) {
-    const int is_ply = !strcmp(j->extension, ".ply");
+    const int is_bare = tree_is_bare(j);
     int status = CLI_DONE;
     for (int t = 0; t < j->forest->tree_count && !status; t++) {
         treepieces_mesh *bark = NULL, *leaves = NULL;
         const int species = j->forest->trees[t].species;
         const treepieces_species *s = &j->species[species];
-        const int to_wood = is_ply || tree_has_one_bark(j) ? 0 : species;
+        const int to_wood = is_bare || tree_has_one_bark(j) ? 0 : species;
         status = bake_tree(j, t, j->posed, &bark, &leaves);
-        if (!status) status = append(j, bark, is_ply ? s->bark_color : NULL, &b->wood[to_wood]);
+        if (!status) status = append(j, bark, is_bare ? s->bark_color : NULL, &b->wood[to_wood]);
         if (!status && leaves)
-            status = append(j, leaves, is_ply ? s->leaf_color : NULL,
-                            is_ply ? &b->wood[0] : &b->foliage[species]);
+            status = append(j, leaves, is_bare ? s->leaf_color : NULL,
+                            is_bare ? &b->wood[0] : &b->foliage[species]);
         treepieces_mesh_free(bark);
         treepieces_mesh_free(leaves);
     }

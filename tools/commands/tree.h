@@ -58,6 +58,9 @@ void free_tree_job(tree_job *j);
 
 int tree_is_glb(const tree_job *j);
 
+/* Does the file hold no pictures, as .ply and .stl? */
+int tree_is_bare(const tree_job *j);
+
 /* Read all species of --species. */
 int tree_read_species(tree_job *j);
 
@@ -78,7 +81,7 @@ int tree_has_one_bark(const tree_job *j);
 /* Is a picture made of the bark of species s? */
 int tree_has_bark(const tree_job *j, int s);
 
-/* Bark and leaves, but for a .ply, which shows none. tint: the color of one bark for all. */
+/* Bark and leaves, but for files that show none. tint: the color of one bark for all. */
 int tree_dress(tree_job *j, float tint[3]);
 
 /* ---- tree_rig.c ---- */

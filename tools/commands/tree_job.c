@@ -39,6 +39,10 @@ int tree_is_glb(const tree_job *j) {
     return !strcmp(j->extension, ".glb");
 }
 
+int tree_is_bare(const tree_job *j) {
+    return !strcmp(j->extension, ".ply") || !strcmp(j->extension, ".stl");
+}
+
 /* ---- species ------------------------------------------------------------------------------- */
 
 /* A built-in species, or one from a file: a name with a dot or a slash is a file. */

@@ -219,7 +219,7 @@ static void set_material(const tree_job *j, const picture *p, int is_cut_out, me
 int tree_dress(tree_job *j, float tint[3]) {
     int status = CLI_DONE;
     brightest_bark(j, tint);
-    if (!strcmp(j->extension, ".ply")) return CLI_DONE;
+    if (tree_is_bare(j)) return CLI_DONE;
     for (int s = 0; s < j->species_count && !status; s++) {
         if (tree_has_bark(j, s))
             status = make_bark(j, s, tree_has_one_bark(j) ? tint : j->species[s].bark_color);

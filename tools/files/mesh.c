@@ -22,14 +22,37 @@ static int is_wide_text(const unsigned char *bytes, size_t size) {
                          (bytes[0] == 0xfe && bytes[1] == 0xff));
 }
 
+/* A line with the word solid and a name; then facets, or the end. */
+static int is_stl_text(const text *in) {
+    text at = *in;
+    text_skip_space(&at);
+    if (!starts_with(&at, "solid")) return 0;
+    if (!memchr(at.at, 0, (size_t)(at.end - at.at))) return 1;
+    text_skip_line(&at);
+    text_skip_space(&at);
+    return starts_with(&at, "facet") || starts_with(&at, "endsolid");
+}
+
+static int is_gltf_text(const text *in) {
+    text at = *in;
+    text_skip_space(&at);
+    return at.at < at.end && *at.at == '{';
+}
+
 static int read_format(builder *b, const unsigned char *bytes, size_t size, int points_too) {
     text in = text_of(bytes, size);
     int ok;
     if (size >= 4 && !memcmp(bytes, "glTF", 4))
-        return builder_fail(b, 0, "glTF is only written, not read; convert it to OBJ or PLY");
+        return mesh_read_glb(b, bytes, size);
     if (is_wide_text(bytes, size))
         return builder_fail(b, 0, "its text is in UTF-16; save it in UTF-8");
+    if (stl_has_size(bytes, size)) return mesh_read_stl_binary(b, bytes, size);
+    if (is_gltf_text(&in))
+        return builder_fail(b, 0, "a .gltf has its triangles in other files; save it as .glb");
     if (starts_with(&in, "ply")) ok = mesh_read_ply(b, &in, points_too);
+    else if (off_begins(&in)) ok = mesh_read_off(b, &in);
+    else if (is_stl_text(&in)) ok = mesh_read_stl_text(b, &in);
+    else if (stl_may_be(bytes, size)) return mesh_read_stl_binary(b, bytes, size);
     else ok = mesh_read_obj(b, &in);
     b->commas = in.commas;
     return ok;
@@ -95,9 +118,11 @@ mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own) {
 /* ---- writing ----------------------------------------------------------------------------- */
 
 int mesh_can_write(const char *extension, const char **why) {
-    if (!strcmp(extension, ".obj") || !strcmp(extension, ".ply") || !strcmp(extension, ".glb"))
-        return 1;
-    return *why = "end the name in .obj, .ply or .glb", 0;
+    static const char *const all[] = {".obj", ".ply", ".stl", ".glb"};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        if (!strcmp(extension, all[i])) return 1;
+    }
+    return *why = "end the name in .obj, .ply, .stl or .glb", 0;
 }
 
 int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
@@ -112,6 +137,7 @@ int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **
     if (is_glb) ok = mesh_write_glb(scene, &s);
     else if (!strcmp(extension, ".ply")) 
         ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &scene->place, &s);
+    else if (!strcmp(extension, ".stl")) ok = mesh_write_stl(scene, &s);
     else ok = mesh_write_obj(scene, &s);
     if (!ok) s.failed = 1;
     return sink_finish(&s, bytes, size, why);

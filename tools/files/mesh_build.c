@@ -221,7 +221,9 @@ static int place_positions(builder *b) {
 static void write_note(builder *b) {
     static const char *const names[LEFT_KINDS] = {
         "faces with less than three corners", "unused vertices that are not finite",
-        "texture coordinates that are not finite", "normals that are not finite"};
+        "texture coordinates that are not finite", "normals that are not finite",
+        "colors of faces", "attributes of STL facets", "points and lines",
+        "instanced meshes"};
     char *to = b->mesh->note;
     const size_t room = sizeof b->mesh->note;
     size_t n = 0;
@@ -255,11 +257,11 @@ int builder_finish(builder *b) {
         if (!has_uvs) continue;
         const float *uv = (const float *)b->uvs.items + 2 * (size_t)corners[i].uv;
         mesh->uvs[2 * i] = corners[i].uv == NO_UV ? 0 : uv[0];
-        mesh->uvs[2 * i + 1] = corners[i].uv == NO_UV ? 0 : turn_v(uv[1]);
+        mesh->uvs[2 * i + 1] = corners[i].uv == NO_UV ? 0 : b->v_runs_down ? uv[1] : turn_v(uv[1]);
     }
     mesh->vertex_count = b->positions.count;
     mesh->triangle_count = count;
-    mesh->normals = (float *)take(&b->normals);
+    mesh->normals = b->normals.count ? (float *)take(&b->normals) : NULL;
     mesh->rotations = (float *)take(&b->rotations);
     mesh->colors = (unsigned char *)take(&b->colors);
     write_note(b);

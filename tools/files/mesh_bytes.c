@@ -29,7 +29,7 @@ int list_reserve(list *l, size_t capacity) {
 void *list_add(list *l, size_t more) {
     size_t count;
     if (!txm_add(l->count, more, &count)) return NULL;
-    if (count > l->capacity && !list_reserve(l, count + count / 2 + 16)) return NULL;
+    if ((count > l->capacity || !l->items) && !list_reserve(l, count + count / 2 + 16)) return NULL;
     void *place = (char *)l->items + l->count * l->size;
     l->count = count;
     return place;

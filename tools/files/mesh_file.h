@@ -43,7 +43,10 @@ typedef struct polygon {
 } polygon;
 
 /* What is left out and counted, as it does no harm. */
-enum { LEFT_FACES, LEFT_VERTICES, LEFT_UVS, LEFT_NORMALS, LEFT_KINDS };
+enum {
+    LEFT_FACES, LEFT_VERTICES, LEFT_UVS, LEFT_NORMALS, LEFT_FACE_COLORS, LEFT_FACET_BYTES,
+    LEFT_PRIMITIVES, LEFT_INSTANCES, LEFT_KINDS
+};
 
 /* A position that is not finite. */
 typedef struct bad_position {
@@ -60,6 +63,7 @@ typedef struct builder {
     size_t left_out[LEFT_KINDS]; /* how many of each                                       */
     size_t commas;               /* decimal commas                                         */
     int unmoved;                 /* positions stay where they are                          */
+    int v_runs_down;             /* in the list of uvs, as in memory                       */
     mesh_data *mesh;
     const char **why;
 } builder;
@@ -158,6 +162,10 @@ int text_number(text *in, double *value);
 /* The same for a number that must be finite as a float. */
 int text_to_float(double value, float *to);
 
+static inline uint32_t u32_at(const unsigned char *p) {
+    return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
 /* ---- a file in the making: mesh_bytes.c -------------------------------------------------- */
 
 /* A file in the making; a failed allocation is seen at the end. */
@@ -236,8 +244,22 @@ mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own);
 
 /* ---- the formats ------------------------------------------------------------------------- */
 
+/* Does an OFF file begin here? */
+int off_begins(const text *in);
+
+/* Has this the size that a binary STL must have, whatever its first word is? */
+int stl_has_size(const unsigned char *bytes, size_t size);
+
+/* May it be one with bytes behind it, or one that is cut off: no text? */
+int stl_may_be(const unsigned char *bytes, size_t size);
+
 int mesh_read_obj(builder *b, text *in);                  /* mesh_obj.c */
 int mesh_read_ply(builder *b, text *in, int points_too);  /* mesh_ply.c */
+int mesh_read_off(builder *b, text *in);                  /* mesh_off.c */
+int mesh_read_stl_text(builder *b, text *in);             /* mesh_stl.c */
+int mesh_read_stl_binary(builder *b, const unsigned char *bytes, size_t size);
+int mesh_read_glb(builder *b, const unsigned char *bytes, size_t size); /* mesh_gltf.c */
+int mesh_write_stl(const mesh_scene *scene, sink *s);
 int mesh_write_obj(const mesh_scene *scene, sink *s);
 int mesh_write_ply(const mesh_data *m, const mesh_place *place, sink *s);
 int mesh_write_glb(const mesh_scene *scene, sink *s);     /* mesh_glb.c */

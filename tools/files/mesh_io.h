@@ -1,7 +1,8 @@
 /* mesh_io.h - mesh files in and out
    SPDX-License-Identifier: MIT OR Unlicense
 
-   Reads OBJ and PLY (ascii and binary); writes OBJ with its material, PLY and GLB (glTF 2.0). Where
+   Reads OBJ, PLY and STL (both ascii and binary), OFF and GLB (glTF 2.0: the triangles of its scene);
+   writes OBJ with its material, PLY, STL (in text where floats would be too coarse) and GLB. Where
    a function fails it returns 0, nothing stays allocated, and *why is set to an English phrase that
    fits after "cannot read 'x.obj': "; it may point to the mesh's own message.
 

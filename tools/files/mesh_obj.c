@@ -157,7 +157,7 @@ int mesh_read_obj(builder *b, text *in) {
     if (ok && b->polygons.count == 0)
         return builder_fail(b, 0, "%s", b->positions.count
                                             ? "no faces in it"
-                                            : "no vertices in it; give an OBJ or PLY file");
+                                            : "no vertices in it; give an OBJ, PLY, STL, OFF or GLB file");
     return ok;
 }
 

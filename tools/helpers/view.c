@@ -1,4 +1,4 @@
-/* view.c - a picture of a mesh: view MESH -o OUT.png [options]; meshes are OBJ or PLY
+/* view.c - a picture of a mesh: view MESH -o OUT.png [options]; meshes are of any format
    SPDX-License-Identifier: MIT OR Unlicense
 
      --size WxH            default 800x800

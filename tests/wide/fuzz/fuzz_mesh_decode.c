@@ -1,9 +1,9 @@
 /* fuzz_mesh_decode.c - hostile bytes into mesh_decode
    SPDX-License-Identifier: MIT OR Unlicense
 
-   With clang: -fsanitize=fuzzer,address,undefined, run on a folder of OBJ and PLY files.
+   With clang: -fsanitize=fuzzer,address,undefined, run on a folder of files of all formats.
    With any compiler: -DFUZZ_STANDALONE; the program then mutates the files it is given itself,
-   and what they are as binary PLY:
+   and what they are as binary PLY, as STL and as GLB:
    fuzz_mesh_decode RUNS FILE...
 
    Built with the mesh and image files of tools/files/. Whatever is accepted must be as mesh_io.h
@@ -14,7 +14,10 @@
 
 static long accepted; /* meshes so far */
 
-enum { MOST_INPUT = 1 << 16 };
+enum {
+    MOST_INPUT = 1 << 16,
+    COPIES = 4 /* of a byte: nodes of a GLB may repeat meshes so often */
+};
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -25,8 +28,9 @@ static void check_floats(const float *values, size_t count) {
 }
 
 static void check(const mesh_data *m, size_t size) {
-    if (!m->positions || m->vertex_count == 0 || m->vertex_count > size) abort();
-    if (m->triangle_count > size || (m->triangle_count && !m->indices)) abort();
+    if (!m->positions || m->vertex_count == 0 || m->vertex_count > COPIES * size)
+        abort();
+    if (m->triangle_count > COPIES * size || (m->triangle_count && !m->indices)) abort();
     check_floats(m->positions, 3 * m->vertex_count);
     check_floats(m->normals, 3 * m->vertex_count);
     check_floats(m->rotations, 4 * m->vertex_count);
@@ -62,21 +66,19 @@ static void write_and_read(const mesh_data *m, const char *extension) {
     scene.surface = m;
     scene.place = m->place;
     if (!mesh_encode(extension, &scene, &bytes, &size, &why)) abort();
-    if (strcmp(extension, ".glb") != 0) {
-        const double slack = extent_of(m) / (1 << 17);
-        if (!mesh_decode(bytes, size, 1, &again, &why)) abort();
-        check(&again, size);
-        if (again.triangle_count != m->triangle_count) abort();
-        for (size_t c = 0; c < 3 * m->triangle_count; c++) {
-            const float *p = m->positions + 3 * (size_t)m->indices[c];
-            const float *q = again.positions + 3 * (size_t)again.indices[c];
-            for (int k = 0; k < 3; k++) {
-                const double a = mesh_place_out(&m->place, p[k], k);
-                if (fabs(a - mesh_place_out(&again.place, q[k], k)) > slack) abort();
-            }
+    const double slack = extent_of(m) / (1 << 17);
+    if (!mesh_decode(bytes, size, MESH_POINTS, &again, &why)) abort();
+    check(&again, size);
+    if (again.triangle_count != m->triangle_count) abort();
+    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
+        const float *p = m->positions + 3 * (size_t)m->indices[c];
+        const float *q = again.positions + 3 * (size_t)again.indices[c];
+        for (int k = 0; k < 3; k++) {
+            const double a = mesh_place_out(&m->place, p[k], k);
+            if (fabs(a - mesh_place_out(&again.place, q[k], k)) > slack) abort();
         }
-        mesh_free(&again);
     }
+    mesh_free(&again);
     free(bytes);
 }
 
@@ -88,7 +90,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     uint8_t *copy = (uint8_t *)malloc(size ? size : 1);
     if (!copy) return 0;
     if (size) memcpy(copy, data, size);
-    const int ok = mesh_decode(copy, size, 1, &mesh, &why);
+    const int ok = mesh_decode(copy, size, MESH_POINTS, &mesh, &why);
     free(copy);
     if (!ok) {
         if (!why || !why[0] || strchr(why, '\n') || mesh.positions || mesh.indices) abort();
@@ -99,6 +101,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (mesh.triangle_count) {
         write_and_read(&mesh, ".obj");
         write_and_read(&mesh, ".glb");
+        write_and_read(&mesh, ".stl");
     }
     write_and_read(&mesh, ".ply");
     mesh_free(&mesh);
@@ -109,7 +112,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 /* Copy one of the seeds and change it in one to four places. */
 static size_t mutate(txm_rng *rng, const uint8_t *seed, size_t size, uint8_t *data) {
     static const char *const words[] = {"-1", "0", "4294967296", "nan", "1e999", "\\\n", "/", "//",
-                                        "\n", "list ", "property ", "element face 2", "v ", "f "};
+                                        "\n", "list ", "property ", "element face 2", "v ", "f ",
+                                        "facet ", "endloop", "vertex ", "OFF ", "C", "\r", "1,5", "1D9",
+                                        "[0]", "{}", "5121", "5123", "5125", "5126", "\"mesh\"",
+                                        "\"mode\":5", "\"mode\":6", "SCALAR", "VEC3", "tristrips",
+                                        "int64", "\"children\"", "\"scale\"", "1e99", "1e-99"};
     memcpy(data, seed, size);
     for (uint32_t n = 1 + txm_rng_below(rng, 4); n > 0 && size > 0; n--) {
         size_t at = txm_rng_below(rng, (uint32_t)size);
@@ -140,6 +147,8 @@ static void fuzz(txm_rng *rng, const uint8_t *seed, size_t size, long runs) {
 }
 
 int main(int argc, char **argv) {
+    enum { FORMATS = 4 };
+    static const char *const formats[FORMATS] = {"", ".ply", ".stl", ".glb"};
     static uint8_t seed[MOST_INPUT];
     long runs = argc > 2 ? atol(argv[1]) : 0;
     int files = argc - 2;
@@ -152,19 +161,22 @@ int main(int argc, char **argv) {
         FILE *file = fopen(argv[2 + f], "rb");
         size_t size = file ? fread(seed, 1, sizeof seed, file) : 0;
         mesh_data mesh;
-        mesh_scene scene = {0};
-        unsigned char *binary;
         const char *why = "cannot be opened";
-        if (!file || fclose(file) != 0 || !mesh_decode(seed, size, 1, &mesh, &why)) {
+        if (!file || fclose(file) != 0 || !mesh_decode(seed, size, MESH_POINTS, &mesh, &why)) {
             fprintf(stderr, "cannot read '%s': %s\n", argv[2 + f], why);
             return 2;
         }
-        fuzz(&rng, seed, size, runs / files / 2);
-        scene.surface = &mesh;
-        scene.place = mesh.place;
-        if (!mesh_encode(".ply", &scene, &binary, &size, &why)) return 2;
-        fuzz(&rng, binary, size, runs / files / 2);
-        free(binary);
+        fuzz(&rng, seed, size, runs / files / FORMATS);
+        for (int k = 1; k < FORMATS; k++) {
+            mesh_scene scene = {0};
+            unsigned char *binary;
+            scene.surface = &mesh;
+            scene.place = mesh.place;
+            if (k > 1 && mesh.triangle_count == 0) continue;
+            if (!mesh_encode(formats[k], &scene, &binary, &size, &why)) return 2;
+            fuzz(&rng, binary, size, runs / files / FORMATS);
+            free(binary);
+        }
         mesh_free(&mesh);
     }
     printf("%ld runs, %ld accepted\n", runs, accepted);
