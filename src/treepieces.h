@@ -102,7 +102,8 @@
    SAME BYTES
      Trees are computed by sums, products, quotients and square roots in a fixed order: the same
      bytes on any number of threads and with any compiler that keeps to IEEE 754 (see texmath.h),
-     built with -ffp-contract=off. The same holds for bones, skinning and tessellation.
+     built with -ffp-contract=off. The same holds for bones, skinning and tessellation. (gcc -std=c99
+     for s390x takes floats for doubles between two assignments; the implementation tells it not to.)
 
    LIMITS
      Up to 3 leaf rims, 255 vertices and 255 quads per piece, 16 kinds of pieces, 65,535 pieces per
@@ -689,6 +690,15 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #if defined(TREEPIECES_IMPLEMENTATION) && !defined(TREEPIECES_IMPLEMENTED)
 #define TREEPIECES_IMPLEMENTED
 
+/* Where float expressions are evaluated in double (gcc -std=c99 for s390x), trees would get other
+   bytes: round after every operation. */
+#include <float.h>
+#if FLT_EVAL_METHOD == 1 && defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("excess-precision=fast")
+#define TPC_POP_OPTIONS
+#endif
+
 #include "treepieces/rim.h"
 #include "treepieces/builtin.h"
 #include "treepieces/kit.h"
@@ -706,6 +716,11 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #include "treepieces/spray.h"
 #include "treepieces/impostor.h"
 #include "treepieces/bake.h"
+
+#ifdef TPC_POP_OPTIONS
+#pragma GCC pop_options
+#undef TPC_POP_OPTIONS
+#endif
 #endif /* TREEPIECES_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------
