@@ -57,10 +57,13 @@ static void obj_colors(void **state) {
 static void polygons_become_triangles(void **state) {
     (void)state;
     mesh_data m;
-    /* convex: a fan */
-    static const uint32_t fan[] = {0, 1, 2, 0, 2, 3, 0, 3, 4};
-    read_text("v 0 0 0\nv 2 0 0\nv 3 2 0\nv 1 3 0\nv -1 2 0\nf 1 2 3 4 5\n", &m);
-    assert_indices(&m, fan, 3);
+    /* a square, cut from its first corner; one that is hollow beside it is not */
+    static const uint32_t square[] = {0, 1, 2, 0, 2, 3}, hollow[] = {0, 1, 3, 1, 2, 3};
+    read_text("v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n", &m);
+    assert_indices(&m, square, 2);
+    mesh_free(&m);
+    read_text("v 0 0 0\nv 1 2 0\nv 2 0 0\nv 1 3 0\nf 1 2 3 4\n", &m);
+    assert_indices(&m, hollow, 2);
     mesh_free(&m);
     /* an L that a fan from its first corner would leave */
     read_text("v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\n", &m);
