@@ -163,7 +163,7 @@ static void text_as_people_have_it(void **state) {
         "v 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2 3\n",
         "\xef\xbb\xbfv 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2 3\n",
         "# a\rv 0 0 0\rv 1.5 0 0\rv 0 25 0\rf 1 2 3\r",
-        "v 0 0 0\r\nv 1.5 \\\r\n0 0\r\nv 0 25 0\r\nf 1 2\\  \r\n 3",
+        "v 0 0 0\r\nv 1.5 \\\r\n0 0\r\nv 0 25 0\r\nf 1 2\\  \r\n 3 \\",
         "# C:\\\nv 0 0 0\no a\\\nv 1.5 0 0 # \\\nv 0 25 0\nusemtl \\\nf 1 2 3 # \\\nfoo\\\n",
         "mtllib b\\\rv 0 0 0\rg\\\rv 1.5 0 0\rv 0 25 0\rf 1 2 3",
         "v 0 0D0 0.\nv 1.5D+00 0 0.d0\nv 0 2.5d1 0\nf 1 2 3\n",
