@@ -72,7 +72,7 @@ class Glb:
         return out
 
     def primitive(self, p):
-        """Its positions and number of triangles."""
+        """Its positions and indices."""
         at = p["attributes"]
         positions = self.values(at["POSITION"])
         need("min" in self.json["accessors"][at["POSITION"]], "POSITION without min and max")
@@ -85,8 +85,7 @@ class Glb:
         indices = [i[0] for i in self.values(p["indices"])]
         need(len(indices) % 3 == 0, "a triangle has not three corners")
         need(max(indices) < len(positions), "an index is too large")
-        need(set(indices) == set(range(len(positions))), "a vertex of no triangle")
-        return positions, len(indices) // 3
+        return positions, indices
 
 
 def instances_of(glb, node):
@@ -131,15 +130,21 @@ def main():
         if "mesh" not in node:
             continue
         count = instances_of(glb, node)
+        used = {} # by the primitives of several materials, which share their vertices
         for p in glb.json["meshes"][node["mesh"]]["primitives"]:
-            positions, triangles = glb.primitive(p)
+            positions, indices = glb.primitive(p)
+            shared = used.setdefault(p["attributes"]["POSITION"], set())
+            if not shared and not count:
+                found["vertices"] += len(positions)
+                found["places"] += len(set(positions))
+            shared.update(indices)
             if count:
                 continue
-            found["vertices"] += len(positions)
-            found["triangles"] += triangles
-            found["places"] += len(set(positions))
+            found["triangles"] += len(indices) // 3
             found["uvs"] |= "TEXCOORD_0" in p["attributes"]
             found["colors"] |= "COLOR_0" in p["attributes"]
+        for accessor, indices in used.items():
+            need(indices == set(range(len(glb.values(accessor)))), "a vertex of no triangle")
         found["instances"] += count
         found["prototypes"] += count > 0
     found["images"], found["uris"] = check_images(glb)

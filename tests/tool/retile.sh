@@ -173,6 +173,58 @@ check "into the GLB" $check_glb s.glb places=100 colors=1
 check "texture coordinates are carried" run 0 torus.obj -o uv.glb --vertices 300
 check "into the GLB, seams doubled" sh -c "
     $check_glb uv.glb places=300 uvs=1 && $check_glb uv.glb | grep -q ' vertices=[34][1-9]'"
+# seams, materials, colors of faces
+printf 'P3\n2 2\n255\n255 0 0  0 255 0  0 0 255  9 9 9\n' >four.ppm
+check "with a texture, edges follow its seams" run 0 torus.obj -o uv.obj --vertices 300 --texture four.ppm \
+    --stats stats.json
+check "which are no creases" figures seam_edges=24 crease_edges=0
+check "so that no triangle leaves its chart" awk '/^vt / { u[++n] = $2; v[n] = $3 } /^f / {
+    for (k = 0; k < 3; k++) { split($(2 + k), a, "/"); x[k] = u[a[2]]; y[k] = v[a[2]] }
+    for (k = 0; k < 3; k++) { d = x[k] - x[(k + 1) % 3]; e = y[k] - y[(k + 1) % 3]
+        if (d * d > 0.04 || e * e > 0.09) { print; exit 1 } } }' uv.obj
+check "and seams lie where they were" awk '/^v / { y[++n] = $3; z[n] = $4 } /^vt / { u[++m] = $2 } /^f / {
+    for (k = 2; k < 5; k++) { split($k, a, "/"); if ((u[a[2]] < 1e-5 || u[a[2]] > 1 - 1e-5)) {
+        seen++; if (y[a[1]] ^ 2 > 1e-8) { print; exit 1 } } } } END { exit seen < 20 }' uv.obj
+check "not with --no-keep-seams" run 0 torus.obj -o t.obj --vertices 300 --texture four.ppm --no-keep-seams \
+    --stats stats.json
+check "none" figures seam_edges=0
+check "nor without a picture" run 0 torus.obj -o t.obj --vertices 300 --stats stats.json
+check "none either" figures seam_edges=0
+check "but with --keep-seams" run 0 torus.obj -o t.obj --vertices 300 --keep-seams --stats stats.json
+check "all" figures seam_edges=24
+check "seams that are too many are said not to be kept" warns "too few vertices to follow its seams" \
+    retile torus.obj -o t.obj --vertices 9 --texture four.ppm
+refuses 2 "choose one of --keep-seams and --no-keep-seams" torus.obj -o t.obj --vertices 300 --keep-seams \
+    --no-keep-seams
+refuses 1 "has no texture coordinates and no materials" cube.obj -o t.obj --vertices 300 --keep-seams
+check "two materials" sh -c "awk '/^f / { if (n++ == 0) print \"mtllib two.mtl\\nusemtl one\"; if (n == 65) print \"usemtl two\" }
+    { print }' torus.obj >two.obj"
+check "are kept" run 0 two.obj -o two-out.obj --vertices 400
+check "with the name of their library" grep -qx 'mtllib two.mtl' two-out.obj
+check "in one group each" test "$(grep usemtl two-out.obj | tr '\n' ' ')" = 'usemtl one usemtl two '
+check "each on its half" awk '/^v / { y[++n] = $3 } /^usemtl/ { one = $2 == "one" } /^f / { m = 0
+    for (k = 2; k < 5; k++) { split($k, a, "/"); m += y[a[1]] }
+    if (one ? m < -1e-6 : m > 1e-6) { print; exit 1 } }' two-out.obj
+check "in a GLB as two primitives" warns "not kept in .glb: colors and pictures of 'two.mtl'" retile two.obj \
+    -o two.glb --vertices 400
+check "which is whole" $check_glb two.glb places=400
+cp two.glb "$glbs/two-materials.glb"
+check "a PLY has none" warns "not kept in .ply: materials (2)" retile two.obj -o two.ply --vertices 400
+check "with a texture, both have it" run 0 two.obj -o two-tex.obj --vertices 400 --texture four.ppm
+check "in the library" test "$(grep -c 'map_Kd two-tex-texture.png' two-tex.mtl)" = 2
+check "coordinates that leave the picture" sh -c "awk '/^vt/ { print \$1, 8 * \$2, 4 * \$3; next } { print }' torus.obj >rep.obj"
+check "make it repeat" run 0 rep.obj -o rep.glb --vertices 300 --texture four.ppm
+check "both ways" grep -qa '"wrapS":10497,"wrapT":10497' rep.glb
+sed -e 's/^property uchar .*//' -e '/^$/d' -e 's/^\(property list.*\)/\1\nproperty uchar red\nproperty uchar green\nproperty uchar blue/' \
+    -e 's/^\([01] [01] 0\) .*/\1/' -e 's/^3 0 1 2/& 255 0 0/' -e 's/^3 0 2 3/& 0 0 255/' colored.ply >faces.ply
+check "colors of faces" run 0 faces.ply -o faces-out.ply --vertices 100
+check "stay colors of faces" sh -c "head -c 600 faces-out.ply | LC_ALL=C sed -n '/element face/,/end_header/p' | grep -q 'uchar red'"
+check "or of a GLB's vertices" run 0 faces.ply -o faces.glb --vertices 100
+check "which it has" $check_glb faces.glb places=100 colors=1
+cp faces.glb "$glbs/face-colors.glb"
+check "or of an OBJ's vertices" run 0 faces.ply -o faces.obj --vertices 100
+check "some of them pure" sh -c "grep -q '^v .* 1 0 0\$' faces.obj && grep -q '^v .* 0 0 1\$' faces.obj"
+
 check "no temporary file is left" sh -c "! ls | grep -q tmp"
 check "--quiet says nothing" sh -c "
     '$texkit' retile cube.obj -o q.obj --vertices 50 --quiet | wc -c | grep -qx 0"

@@ -206,8 +206,9 @@ static void off_of_all_kinds(void **state) {
         assert_int_equal(m.uvs != NULL, i == 7);
         if (m.uvs) assert_float_equal(m.uvs[0], 0.5, 0);
         if (i == 8)
-            assert_string_equal(m.note, "left out: faces with less than three corners (2), colors of "
-                                        "faces (1)");
+            assert_string_equal(m.note, "left out: faces with less than three corners (2)");
+        assert_int_equal(m.face_colors != NULL, i == 8);
+        if (i == 8) assert_memory_equal(m.face_colors, "\xff\0\0\xff", 4);
         mesh_free(&m);
     }
     assert_fails("OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n",

@@ -13,8 +13,10 @@ static const cli_manual retile_manual = {
     "cover a surface with near-equilateral triangles",
     "MESH is an OBJ, PLY, STL, OFF or GLB file; small faults are repaired (equal vertices welded,\n"
     "triangles oriented consistently, fins removed). OUT ends in .obj, .ply, .stl or .glb; it has\n"
-    "exactly N vertices, not counting copies along texture seams. Texture coordinates and colors of\n"
-    "MESH are carried over, unless one of these options textures the triangles:\n"
+    "exactly N vertices, not counting copies along texture seams. Texture coordinates, materials and\n"
+    "colors of MESH, of vertices or faces, are carried over; a warning names what OUT cannot hold.\n"
+    "With --texture, a material library or several materials, edges follow the seams between charts\n"
+    "and materials (see --keep-seams). These options texture the triangles anew:\n"
     "--tiles DIR names a set of 'texkit tiles --kind triangle': every triangle gets a tile\n"
     "  whose edges match those of its neighbours.\n"
     "--patches PICTURE is a row of equilateral triangles, each with a gutter around it:\n"
@@ -50,6 +52,8 @@ static int check_options(retile_job *j, const char *method) {
     j->desc.method = repels ? TRIMESH_REPEL : TRIMESH_LATTICE;
     if ((j->tiles != NULL) + (j->patches != NULL) + (j->texture != NULL) > 1)
         return cli_fail(run, CLI_USAGE, "choose one of --tiles, --patches and --texture");
+    if (j->keep_seams && j->no_seams)
+        return cli_fail(run, CLI_USAGE, "choose one of --keep-seams and --no-keep-seams");
     if (j->dot && !j->instances) return cli_fail(run, CLI_USAGE, "--dot goes with --instances");
     if (j->curved && !j->instances)
         return cli_fail(run, CLI_USAGE, "--curved goes with --instances");
@@ -80,10 +84,31 @@ static int read_mesh(retile_job *j, const char *path, int flags, mesh_data *mesh
 /* An STL holds triangles only. */
 static void warn_of_stl(retile_job *j) {
     const mesh_data *m = &j->input;
-    if (strcmp(j->extension, ".stl") != 0 || (!m->colors && !m->uvs)) return;
-    cli_warn(&j->run, "'%s' will hold no %s%s%s; .obj, .ply and .glb do", j->run.output,
-             m->colors ? "colors" : "", m->colors && m->uvs ? " and no " : "",
-             m->uvs ? "texture coordinates" : "");
+    const char *lost[3];
+    int count = 0;
+    if (strcmp(j->extension, ".stl") != 0) return;
+    if (m->colors || m->face_colors) lost[count++] = "colors";
+    if (m->uvs) lost[count++] = "texture coordinates";
+    if (m->material_count > 1) lost[count++] = "materials";
+    if (count == 0) return;
+    cli_warn(&j->run, "'%s' will hold no %s%s%s%s%s; .obj and .glb do", j->run.output, lost[0],
+             count > 1 ? " and no " : "", count > 1 ? lost[1] : "", count > 2 ? " and no " : "",
+             count > 2 ? lost[2] : "");
+}
+
+/* The pixel of a row of so many at a texture coordinate; the row repeats beyond 0..1. */
+static int pixel_at(float at, int size) {
+    const float u = at < 0 || at > 1 ? at - floorf(at) : at;
+    return (int)(txm_clampf(u, 0, 1) * (float)(size - 1) + 0.5f);
+}
+
+/* Do texture coordinates leave 0..1 by more than rounding, so that the picture repeats? */
+static int leaves_picture(const mesh_data *m) {
+    const float slack = 1e-3f;
+    for (size_t i = 0; i < 6 * m->triangle_count && m->uvs; i++) {
+        if (m->uvs[i] < -slack || m->uvs[i] > 1 + slack) return 1;
+    }
+    return 0;
 }
 
 /* Scales of edge lengths from a picture on the input's texture coordinates: 1 where it is black,
@@ -99,9 +124,7 @@ static int read_density(retile_job *j, float **scale) {
     *scale = (float *)new_array(m->vertex_count, sizeof(float));
     for (size_t i = 0; i < m->vertex_count && *scale; i++) (*scale)[i] = 1;
     for (size_t c = 0; c < 3 * m->triangle_count && *scale; c++) {
-        const float u = txm_clampf(m->uvs[2 * c], 0, 1), v = txm_clampf(m->uvs[2 * c + 1], 0, 1);
-        const int x = (int)(u * (float)(map.width - 1) + 0.5f);
-        const int y = (int)(v * (float)(map.height - 1) + 0.5f);
+        const int x = pixel_at(m->uvs[2 * c], map.width), y = pixel_at(m->uvs[2 * c + 1], map.height);
         const unsigned char *row = (const unsigned char *)txm_image_row_const(&map, y);
         (*scale)[m->indices[c]] = txm_float(pow(0.25, row[x] / 255.0));
     }
@@ -145,6 +168,7 @@ static int write_output(retile_job *j) {
 
     scene.surface = &j->output;
     scene.place = j->input.place;
+    scene.repeats = leaves_picture(&j->output);
     if (j->png) scene.texture = j->png_path[0] ? name_in(j->png_path) : "texture";
     if (is_glb) {
         scene.png = j->png;
@@ -182,20 +206,56 @@ static int write_output(retile_job *j) {
 
 /* ---- the command ---------------------------------------------------------------------------- */
 
+/* Are the seams kept? By default where a picture lies on them, and where materials meet. */
+static int wants_seams(const retile_job *j) {
+    const mesh_data *m = &j->input;
+    if (j->keep_seams || j->no_seams) return j->keep_seams;
+    if (j->tiles || j->patches) return 0;
+    return m->material_count > 1 || (m->uvs && (j->texture || m->library));
+}
+
+/* The seams of the input, in *seams for free(). */
+static int find_seams(retile_job *j, uint32_t **seams) {
+    mesh_data *m = &j->input;
+    if (!m->uvs && !m->materials) {
+        if (!j->keep_seams) return CLI_DONE;
+        return cli_fail(&j->run, CLI_FAILED, "--keep-seams: '%s' has no texture coordinates and no "
+                        "materials", j->run.inputs[0]);
+    }
+    *seams = (uint32_t *)new_array(m->triangle_count, 3 * sizeof(uint32_t));
+    return *seams && mesh_seams(m, *seams) ? CLI_DONE : fail_memory(&j->run);
+}
+
+/* With seams; where they are too many for the vertices and nobody has asked for them, without. */
+static int retile_surface(retile_job *j, uint32_t *seams) {
+    j->desc.seams = wants_seams(j) ? seams : NULL;
+    txm_status result = trimesh_retile(&j->desc, &j->run.env, &j->result);
+    if (result == TXM_TOO_SMALL && j->desc.seams && !j->keep_seams) {
+        j->desc.seams = NULL;
+        result = trimesh_retile(&j->desc, &j->run.env, &j->result);
+        if (result == TXM_OK)
+            cli_warn(&j->run, "'%s': too few vertices to follow its seams; they are not kept",
+                     j->run.inputs[0]);
+    }
+    return check_result(&j->run, result, j->run.inputs[0]);
+}
+
 static int retile(retile_job *j) {
     float *scale = NULL;
+    uint32_t *seams = NULL;
     int status = CLI_DONE;
     if (j->density) status = read_density(j, &scale);
+    if (!status) status = find_seams(j, &seams);
     if (!status) {
         cli_stage(&j->run, "retile");
         j->desc.surface = mesh_view(&j->input);
         j->desc.scale = scale;
         j->desc.seed = j->run.seed;
         j->desc.report = &j->report;
-        status = check_result(&j->run, trimesh_retile(&j->desc, &j->run.env, &j->result),
-                              j->run.inputs[0]);
+        status = retile_surface(j, seams);
     }
     free(scale);
+    free(seams);
     if (status) return status;
     j->output.vertex_count = j->result->vertex_count;
     j->output.triangle_count = j->result->triangle_count;
@@ -212,6 +272,9 @@ static void free_job(retile_job *j) {
     trimesh_mesh_free(j->result);
     free(j->output.colors);
     free(j->output.uvs);
+    free(j->output.face_colors);
+    free(j->output.materials);
+    free(j->sorted);
     free(j->output.corner_normals);
     free(j->placements);
     free(j->png);
@@ -243,6 +306,10 @@ static int run_job(retile_job *j, int argc, char **argv) {
          &j->gutter, 0, 8192},
         {CLI_INPUT, "--texture", "PICTURE", "texture: the one that MESH's coordinates are for",
          &j->texture, 0, 0},
+        {CLI_FLAG, "--keep-seams", NULL,
+         "edges follow the seams of texture coordinates and materials, as they do with --texture",
+         &j->keep_seams, 0, 0},
+        {CLI_FLAG, "--no-keep-seams", NULL, "they do not", &j->no_seams, 0, 0},
         {CLI_INPUT, "--instances", "PATCH.ply", "points or a small mesh for every triangle",
          &j->instances, 0, 0},
         {CLI_INT, "--dot", "PERCENT", "radius of points, in % of an edge length; default: they touch",

@@ -21,6 +21,7 @@ typedef struct retile_job {
     trimesh_desc desc;
     const char *tiles, *patches, *instances, *texture, *density;
     int patch_count, gutter, dot, curved;
+    int keep_seams, no_seams; /* as given */
 
     mesh_data input, patch;
     trimesh_mesh *result;
@@ -28,6 +29,7 @@ typedef struct retile_job {
 
     /* the output: positions, normals and indices are the result's, the rest our own */
     mesh_data output;
+    uint32_t *sorted; /* the output's own indices, or NULL */
 
     /* its picture */
     unsigned char *png;

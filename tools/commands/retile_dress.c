@@ -57,28 +57,161 @@ static int carry_colors(retile_job *j) {
     return status;
 }
 
-static int carry_uvs(retile_job *j) {
-    const size_t corners = 3 * j->input.triangle_count;
+/* Values of the input's corners, `channels` each, at those of the result, on the same side of seams.
+   Releases them, and returns the result's, or NULL with *status. */
+static float *carry_corners(retile_job *j, float *values, int channels, int *status) {
+    const size_t corners = 3 * j->input.triangle_count, made = 3 * j->result->triangle_count;
     const txm_mesh input = mesh_view(&j->input), mesh = trimesh_as_view(j->result);
     uint32_t *own = (uint32_t *)new_array(corners, sizeof(uint32_t)); /* each corner has its own */
+    float *carried = (float *)new_array(made, (size_t)channels * sizeof(float));
     trimesh_values v = {0};
-    int status = CLI_DONE;
-    j->output.uvs = (float *)new_array(j->result->triangle_count, 6 * sizeof(float));
-    if (!own || !j->output.uvs) {
-        status = fail_memory(&j->run);
-    } else {
+    *status = values && own && carried ? CLI_DONE : fail_memory(&j->run);
+    if (!*status) {
         for (size_t c = 0; c < corners; c++) own[c] = (uint32_t)c;
-        v.values = j->input.uvs;
+        v.values = values;
         v.count = corners;
         v.indices = own;
-        v.channels = 2;
-        status = check_result(&j->run,
-                              trimesh_transfer_corners(&input, &v, &mesh, j->result->sources,
-                                                       &j->run.env, j->output.uvs),
-                              j->run.inputs[0]);
+        v.channels = channels;
+        *status = check_result(&j->run,
+                               trimesh_transfer_corners(&input, &v, &mesh, j->result->sources,
+                                                        &j->run.env, carried),
+                               j->run.inputs[0]);
     }
     free(own);
-    return status;
+    free(values);
+    if (!*status) return carried;
+    free(carried);
+    return NULL;
+}
+
+/* Texture coordinates and materials together: where materials meet, there is a seam. */
+static int carry_uvs(retile_job *j) {
+    const mesh_data *in = &j->input;
+    const size_t corners = 3 * in->triangle_count, made = 3 * j->result->triangle_count;
+    float *values = (float *)new_array(corners, 3 * sizeof(float));
+    int status;
+    for (size_t c = 0; c < corners && values; c++) {
+        const size_t face = c / 3;
+        values[3 * c] = in->uvs ? in->uvs[2 * c] : 0;
+        values[3 * c + 1] = in->uvs ? in->uvs[2 * c + 1] : 0;
+        values[3 * c + 2] = in->materials ? (float)in->materials[face] : 0;
+    }
+    float *carried = carry_corners(j, values, 3, &status);
+    if (status) return status;
+    if (in->uvs) j->output.uvs = (float *)new_array(made, 2 * sizeof(float));
+    if (in->materials) j->output.materials = (uint32_t *)new_array(made / 3, sizeof(uint32_t));
+    if ((in->uvs && !j->output.uvs) || (in->materials && !j->output.materials)) {
+        free(carried);
+        return fail_memory(&j->run);
+    }
+    for (size_t c = 0; c < made; c++) {
+        if (in->uvs) memcpy(j->output.uvs + 2 * c, carried + 3 * c, 2 * sizeof(float));
+        if (in->materials) j->output.materials[c / 3] = (uint32_t)carried[3 * c + 2];
+    }
+    free(carried);
+    if (!in->materials) return CLI_DONE;
+    j->output.material_count = in->material_count;
+    j->output.material_names = in->material_names;
+    j->output.library = in->library;
+    return CLI_DONE;
+}
+
+/* Colors of faces: each triangle takes that of the face that it lies on. */
+static int carry_face_colors(retile_job *j) {
+    const unsigned char *colors = j->input.face_colors;
+    const size_t corners = 3 * j->input.triangle_count, made = j->result->triangle_count;
+    float *values = (float *)new_array(corners, 4 * sizeof(float));
+    int status;
+    for (size_t i = 0; i < 4 * corners && values; i++) {
+        const size_t face = i / 12, channel = i % 4;
+        values[i] = colors[4 * face + channel];
+    }
+    float *carried = carry_corners(j, values, 4, &status);
+    if (status) return status;
+    j->output.face_colors = (unsigned char *)new_array(made, 4);
+    for (size_t i = 0; i < 4 * made && j->output.face_colors; i++)
+        j->output.face_colors[i] = (unsigned char)carried[12 * (i / 4) + i % 4];
+    free(carried);
+    return j->output.face_colors ? CLI_DONE : fail_memory(&j->run);
+}
+
+/* OBJ files have colors at vertices only: those get the mean of the faces around them. */
+static int average_face_colors(retile_job *j) {
+    mesh_data *m = &j->output;
+    uint32_t *sums = (uint32_t *)new_array(m->vertex_count, 5 * sizeof(uint32_t));
+    m->colors = (unsigned char *)new_array(m->vertex_count, 4);
+    if (!sums || !m->colors) {
+        free(sums);
+        return fail_memory(&j->run);
+    }
+    memset(sums, 0, 5 * m->vertex_count * sizeof(uint32_t));
+    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
+        uint32_t *sum = sums + 5 * (size_t)m->indices[c];
+        for (size_t k = 0; k < 4; k++) sum[k] += m->face_colors[4 * (c / 3) + k];
+        sum[4]++;
+    }
+    for (size_t v = 0; v < m->vertex_count; v++) {
+        const uint32_t *sum = sums + 5 * v, count = sum[4] ? sum[4] : 1;
+        for (size_t k = 0; k < 4; k++)
+            m->colors[4 * v + k] = (unsigned char)((sum[k] + count / 2) / count);
+    }
+    free(sums);
+    free(m->face_colors);
+    m->face_colors = NULL;
+    return CLI_DONE;
+}
+
+/* Put the triangles into the order of their materials, as files have them. */
+static int sort_by_material(retile_job *j) {
+    mesh_data *m = &j->output;
+    const size_t n = m->triangle_count;
+    txm_pair *order = (txm_pair *)new_array(n, 2 * sizeof *order);
+    float *uvs = m->uvs ? (float *)new_array(n, 6 * sizeof(float)) : NULL;
+    unsigned char *colors = m->face_colors ? (unsigned char *)new_array(n, 4) : NULL;
+    j->sorted = (uint32_t *)new_array(n, 3 * sizeof(uint32_t));
+    if (!order || !j->sorted || (m->uvs && !uvs) || (m->face_colors && !colors)) {
+        free(order);
+        free(uvs);
+        free(colors);
+        return fail_memory(&j->run);
+    }
+    for (size_t t = 0; t < n; t++) {
+        order[t].key = m->materials[t];
+        order[t].value = (uint32_t)t;
+    }
+    txm_sort_pairs(order, order + n, n);
+    for (size_t t = 0; t < n; t++) {
+        const size_t from = order[t].value;
+        m->materials[t] = order[t].key;
+        memcpy(j->sorted + 3 * t, m->indices + 3 * from, 3 * sizeof(uint32_t));
+        if (uvs) memcpy(uvs + 6 * t, m->uvs + 6 * from, 6 * sizeof(float));
+        if (colors) memcpy(colors + 4 * t, m->face_colors + 4 * from, 4);
+    }
+    free(order);
+    free(m->uvs);
+    free(m->face_colors);
+    m->uvs = uvs;
+    m->face_colors = colors;
+    m->indices = j->sorted;
+    return CLI_DONE;
+}
+
+/* Say in one line what the output's format cannot hold; warn_of_stl has done it for STL. */
+static void warn_lost(retile_job *j) {
+    const mesh_data *m = &j->output;
+    const int is_ply = !strcmp(j->extension, ".ply"), is_glb = !strcmp(j->extension, ".glb");
+    char lost[160] = "";
+    size_t n = 0;
+    if (!strcmp(j->extension, ".stl")) return;
+    if (is_ply && m->materials && (m->material_count > 1 || m->library))
+        n += (size_t)snprintf(lost, sizeof lost, "materials (%lu)",
+                              (unsigned long)m->material_count);
+    if (!is_ply && j->input.face_colors && j->input.colors)
+        n += (size_t)snprintf(lost + n, sizeof lost - n, "%scolors of faces", n ? ", " : "");
+    if (is_glb && m->library && !j->png)
+        snprintf(lost + n, sizeof lost - n, "%scolors and pictures of '%.60s'", n ? ", " : "",
+                 m->library);
+    if (lost[0]) cli_warn(&j->run, "'%s': not kept in %s: %s", j->run.inputs[0], j->extension, lost);
 }
 
 /* ---- tiles ---------------------------------------------------------------------------------- */
@@ -282,13 +415,26 @@ static int dress_with_patches(retile_job *j) {
 
 /* ---- all of it ------------------------------------------------------------------------------ */
 
-int retile_dress(retile_job *j) {
+/* Colors, texture coordinates and materials that the input has. */
+static int carry_over(retile_job *j) {
+    const mesh_data *in = &j->input;
+    const int is_ply = !strcmp(j->extension, ".ply"), is_obj = !strcmp(j->extension, ".obj");
+    const int is_textured = j->tiles || j->patches; /* instead */
     int status = CLI_DONE;
+    if (in->colors) status = carry_colors(j);
+    if (!status && in->face_colors && (is_ply || !in->colors)) status = carry_face_colors(j);
+    if (!status && is_obj && j->output.face_colors) status = average_face_colors(j);
+    if (!status && !is_textured && (in->uvs || in->materials)) status = carry_uvs(j);
+    if (!status && j->output.materials) status = sort_by_material(j);
+    if (!status) warn_lost(j);
+    return status;
+}
+
+int retile_dress(retile_job *j) {
     cli_stage(&j->run, "dress");
-    if (j->input.colors) status = carry_colors(j);
+    int status = carry_over(j);
     if (!status && j->tiles) status = dress_with_tiles(j);
-    else if (!status && j->patches) status = dress_with_patches(j);
-    else if (!status && j->input.uvs) status = carry_uvs(j);
+    if (!status && j->patches) status = dress_with_patches(j);
     if (!status && j->texture) {
         txm_image picture = {0};
         if (!j->output.uvs)

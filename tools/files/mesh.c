@@ -42,10 +42,11 @@ static int is_gltf_text(const text *in) {
 static int read_format(builder *b, const unsigned char *bytes, size_t size, int points_too) {
     text in = text_of(bytes, size);
     int ok;
-    if (size >= 4 && !memcmp(bytes, "glTF", 4)) return mesh_read_glb(b, bytes, size);
-    if (stl_has_size(bytes, size)) return mesh_read_stl_binary(b, bytes, size);
+    if (size >= 4 && !memcmp(bytes, "glTF", 4))
+        return mesh_read_glb(b, bytes, size);
     if (is_wide_text(bytes, size))
         return builder_fail(b, 0, "its text is in UTF-16; save it in UTF-8");
+    if (stl_has_size(bytes, size)) return mesh_read_stl_binary(b, bytes, size);
     if (is_gltf_text(&in))
         return builder_fail(b, 0, "a .gltf has its triangles in other files; save it as .glb");
     if (starts_with(&in, "ply")) ok = mesh_read_ply(b, &in, points_too);
@@ -88,6 +89,10 @@ void mesh_free(mesh_data *mesh) {
     free(mesh->colors);
     free(mesh->indices);
     free(mesh->uvs);
+    free(mesh->face_colors);
+    free(mesh->materials);
+    free(mesh->material_names);
+    free(mesh->library);
     free(mesh->corner_normals);
     free(mesh->joints);
     free(mesh->weights);
@@ -107,6 +112,7 @@ mesh_part scene_part(const mesh_scene *scene, int i, mesh_material *own) {
     memset(own, 0, sizeof *own);
     own->name = "surface";
     own->texture = scene->texture;
+    own->repeats = own->repeats_down = scene->repeats;
     own->png = scene->png;
     own->png_size = scene->png_size;
     part.mesh = scene->surface;

@@ -19,7 +19,14 @@ void builder_init(builder *b, mesh_data *mesh, const char **why) {
     b->corners = list_of(sizeof(corner));
     b->polygons = list_of(sizeof(polygon));
     b->triangles = list_of(3 * sizeof(corner));
+    b->flat = list_of(2 * sizeof(double));
+    b->around = list_of(sizeof(size_t));
     b->bad = list_of(sizeof(bad_position));
+    b->names = b->library = list_of(1);
+    b->vertex_shades = b->face_shades = list_of(sizeof(shade));
+    b->texcoords = list_of(sizeof(float));
+    b->faces = list_of(sizeof(uint32_t));
+    b->material = NO_MATERIAL;
     b->mesh = mesh;
     b->why = why;
 }
@@ -33,11 +40,15 @@ void builder_free(builder *b) {
     list_free(&b->corners);
     list_free(&b->polygons);
     list_free(&b->triangles);
-    list_free(&b->bends);
-    list_free(&b->heap);
-    list_free(&b->sorted);
-    list_free(&b->boxes);
+    list_free(&b->flat);
+    list_free(&b->around);
     list_free(&b->bad);
+    list_free(&b->names);
+    list_free(&b->library);
+    list_free(&b->vertex_shades);
+    list_free(&b->face_shades);
+    list_free(&b->texcoords);
+    list_free(&b->faces);
 }
 
 int builder_fail(const builder *b, size_t line, const char *format, ...) {
@@ -88,6 +99,7 @@ int builder_add_polygon(builder *b, size_t first, size_t line) {
     f->first = first;
     f->count = b->corners.count - first;
     f->line = line;
+    f->material = b->material;
     return 1;
 }
 
@@ -165,6 +177,7 @@ int builder_triangulate(builder *b) {
         const polygon *f = &polygons[i];
         const corner *corners = (const corner *)b->corners.items + f->first;
         if (!check_polygon(b, f) || !polygon_triangulate(b, corners, f->count)) return 0;
+        if (!builder_note_faces(b)) return 0;
     }
     return 1;
 }
@@ -222,8 +235,9 @@ static void write_note(builder *b) {
     static const char *const names[LEFT_KINDS] = {
         "faces with less than three corners", "unused vertices that are not finite",
         "texture coordinates that are not finite", "normals that are not finite",
-        "colors of faces", "attributes of STL facets", "points and lines",
-        "instanced meshes"};
+        "attributes of STL facets", "points and lines", "instanced meshes",
+        "colors that are not finite", "further material libraries",
+        "pictures and colors of materials"};
     char *to = b->mesh->note;
     const size_t room = sizeof b->mesh->note;
     size_t n = 0;
@@ -244,7 +258,7 @@ int builder_finish(builder *b) {
     const corner *corners = (const corner *)b->triangles.items;
     int has_uvs = 0;
     size_t bytes;
-    if (!place_positions(b)) return 0;
+    if (!place_positions(b) || !builder_finish_dress(b)) return 0;
     for (size_t i = 0; i < 3 * count && !has_uvs; i++) has_uvs = corners[i].uv != NO_UV;
     if (count) {
         if (!txm_mul(count, 6, sizeof(float), &bytes)) return builder_fail_memory(b);

@@ -8,7 +8,7 @@
 
 #include "mesh_io.h"
 
-static const uint32_t NO_UV = 0xffffffffu, NO_VERTEX = 0xffffffffu;
+static const uint32_t NO_UV = 0xffffffffu, NO_VERTEX = 0xffffffffu, NO_MATERIAL = 0xffffffffu;
 
 /* In memory v runs downwards, in OBJ and PLY files upwards; converts either way. */
 static inline float turn_v(float v) {
@@ -40,12 +40,26 @@ typedef struct corner {
 
 typedef struct polygon {
     size_t first, count, line; /* its corners; line of the file */
+    uint32_t material;         /* or NO_MATERIAL                */
 } polygon;
+
+/* A color as it stands in a file: red, green, blue, alpha. */
+typedef struct shade {
+    float c[4];
+} shade;
+
+/* As alpha: the color has none and is opaque; or there is no color, which becomes white. */
+enum { SHADE_OPAQUE = -1, SHADE_NONE = -2 };
+
+static inline shade shade_none(void) {
+    const shade s = {{0, 0, 0, SHADE_NONE}};
+    return s;
+}
 
 /* What is left out and counted, as it does no harm. */
 enum {
-    LEFT_FACES, LEFT_VERTICES, LEFT_UVS, LEFT_NORMALS, LEFT_FACE_COLORS, LEFT_FACET_BYTES,
-    LEFT_PRIMITIVES, LEFT_INSTANCES, LEFT_KINDS
+    LEFT_FACES, LEFT_VERTICES, LEFT_UVS, LEFT_NORMALS, LEFT_FACET_BYTES, LEFT_PRIMITIVES,
+    LEFT_INSTANCES, LEFT_COLORS, LEFT_LIBRARIES, LEFT_LOOKS, LEFT_KINDS
 };
 
 /* A position that is not finite. */
@@ -58,7 +72,16 @@ typedef struct builder {
     list normals, rotations, colors, uvs; /* 3, 4 floats, 4 bytes, 2 floats; uvs likewise */
     list corners, polygons;                          /* as they stand in the file         */
     list triangles;                                  /* 3 corners each                    */
-    list bends, heap, sorted, boxes;                 /* scratch of mesh_polygon.c, which sets their sizes */
+    list flat, around;                               /* scratch of triangulate            */
+    list names, library;      /* of materials, as in mesh_data                            */
+    list vertex_shades;       /* 1 shade per vertex, or none                              */
+    list face_shades;         /* 1 shade per polygon, or none                             */
+    list texcoords;           /* of the face at hand: floats                              */
+    list faces;               /* 1 per triangle: its polygon, if polygons carry something */
+    size_t polygon;           /* that is being triangulated                               */
+    uint32_t material;        /* of the polygons that follow, or NO_MATERIAL              */
+    uint32_t material_count;
+    int whole_face_shades;    /* they are integers, 0..255 or 0..65535                    */
     list bad;                    /* lines of positions that are not finite, in their order */
     size_t left_out[LEFT_KINDS]; /* how many of each                                       */
     size_t commas;               /* decimal commas                                         */
@@ -87,6 +110,25 @@ int builder_check_position(builder *b, size_t vertex, size_t line);
    known). With less than three corners it is left out. 0: no memory. */
 int builder_add_polygon(builder *b, size_t first, size_t line);
 
+/* ---- what faces carry: mesh_dress.c ------------------------------------------------------ */
+
+/* Colors to bytes: floats of 0..1, 0..255 or 0..65535, as the largest of all says, or with is_whole
+   integers of 0..255 or 0..65535; alpha likewise. Where there is none, white. Returns how many were not
+   finite, and became white. */
+size_t shades_to_bytes(shade *from, size_t count, int is_whole, unsigned char *to);
+
+/* The polygons that follow have the material of this name. 0: no memory. */
+int builder_use_material(builder *b, const char *name, size_t length);
+
+/* The last polygon has this color. 0: no memory. */
+int builder_face_shade(builder *b, const shade *s);
+
+/* The triangles since the last call are those of the next polygon. 0: no memory. */
+int builder_note_faces(builder *b);
+
+/* Hand materials and colors of faces over to the mesh. */
+int builder_finish_dress(builder *b);
+
 /* A strip of triangles: each vertex makes one with the two before it, every second one turned. */
 typedef struct strip {
     uint32_t last[2];
@@ -109,9 +151,8 @@ int builder_finish(builder *b);
 
 /* ---- polygons to triangles: mesh_polygon.c ----------------------------------------------- */
 
-/* Add the triangles of a polygon, two less than it has corners, which are 3 or more: right for any
-   that does not cross itself, whatever its shape, also with corners in a line, with holes that a
-   doubled edge joins on, and not flat. O(n log n) steps. 0: no memory. */
+/* Add the triangles of a polygon. Convex ones become fans; from others ears are cut off while there
+   are any. */
 int polygon_triangulate(builder *b, const corner *p, size_t n);
 
 /* ---- text: mesh_text.c ------------------------------------------------------------------- */
@@ -208,7 +249,7 @@ int place_digits(const mesh_place *place, const mesh_data *m);
 /* ---- equal corners share a vertex: mesh_corners.c ---------------------------------------- */
 
 /* What makes corners differ. */
-enum { BY_VERTEX = 1, BY_UV = 2, BY_NORMAL = 4 };
+enum { BY_VERTEX = 1, BY_UV = 2, BY_NORMAL = 4, BY_FACE = 8 /* its color */ };
 
 /* The distinct corners of a mesh. */
 typedef struct split {
@@ -230,9 +271,13 @@ typedef struct flat_mesh {
     size_t count; /* of vertices */
 } flat_mesh;
 
-int flat_make(const mesh_data *m, int with_corner_normals, flat_mesh *f);
+/* kept: BY_NORMAL and BY_FACE, if normals of corners and colors of faces count too. */
+int flat_make(const mesh_data *m, int kept, flat_mesh *f);
 size_t flat_vertex(const flat_mesh *f, size_t i);
 const float *flat_uv(const flat_mesh *f, size_t i);
+
+/* That of the vertex, or of the face if vertices have none. */
+const unsigned char *flat_color(const flat_mesh *f, size_t i);
 uint32_t flat_index(const flat_mesh *f, size_t corner_index);
 
 /* ---- what a scene holds: mesh.c ---------------------------------------------------------- */

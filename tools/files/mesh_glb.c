@@ -5,7 +5,13 @@
 enum { GL_UNSIGNED_SHORT = 5123, GL_UNSIGNED_INT = 5125, GL_FLOAT = 5126 };
 enum { NORMALIZED = 1 << 16 }; /* with a component type: 0..65535 means 0..1 */
 enum { GL_ARRAY = 34962, GL_ELEMENTS = 34963 };
-enum { MAX_MATERIALS = 64 };
+enum { MAX_MATERIALS = 1024 };
+
+/* A material of the document. */
+typedef struct glb_look {
+    const mesh_material *material; /* NULL: plain white */
+    const char *name;              /* or NULL           */
+} glb_look;
 
 /* The parts of the document are written side by side and put together at the end. */
 typedef struct glb {
@@ -13,9 +19,14 @@ typedef struct glb {
     sink more; /* skins and animations, each after a comma */
     int view_count, accessor_count, mesh_count, node_count;
     const mesh_place *place; /* of all nodes that have a mesh */
-    const mesh_material *materials[MAX_MATERIALS]; /* NULL: plain white */
+    glb_look materials[MAX_MATERIALS];
     int material_count;
 } glb;
+
+static void append(sink *to, const sink *from) {
+    sink_put(to, from->bytes.items, from->bytes.count);
+    to->failed |= from->failed;
+}
 
 /* The bytes since start become a view; target 0: none. Returns its number. */
 static int glb_view(glb *g, size_t start, int target) {
@@ -54,11 +65,17 @@ static int glb_accessor(glb *g, size_t start, int target, int component, size_t 
 }
 
 /* Its number among the materials of the document; the last one if there is no room for more. */
-static int glb_material(glb *g, const mesh_material *material) {
+static int glb_material(glb *g, const mesh_material *material, const char *name) {
     int i = 0;
-    while (i < g->material_count && g->materials[i] != material) i++;
+    while (i < g->material_count &&
+           (g->materials[i].material != material || g->materials[i].name != name))
+        i++;
     if (i == MAX_MATERIALS) return i - 1;
-    if (i == g->material_count) g->materials[g->material_count++] = material;
+    if (i == g->material_count) {
+        g->materials[i].material = material;
+        g->materials[i].name = name;
+        g->material_count++;
+    }
     return i;
 }
 
@@ -111,13 +128,53 @@ static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
                glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f->count, "VEC4", NULL));
 }
 
+/* The triangles from `first` on that have the same material, or all; returns the end. */
+static size_t same_material(const mesh_data *m, size_t first) {
+    size_t end = m->materials ? first + 1 : m->triangle_count;
+    while (end < m->triangle_count && m->materials && m->materials[end] == m->materials[first]) end++;
+    return end;
+}
+
+/* The indices and the material of a primitive, whose attributes stand in the text of meshes from
+   `opening` on. Where triangles have several materials, each run of them is a primitive with the same
+   attributes. 0: no memory. */
+static int glb_triangles(glb *g, const mesh_data *m, const flat_mesh *f, size_t opening,
+                         const mesh_material *material) {
+    sink *bin = &g->binary, *s = &g->meshes, attributes = sink_new();
+    const int is_short = f->count < 65535; /* 65535 itself is not an index */
+    if (!s->failed) sink_put(&attributes, (const char *)s->bytes.items + opening, s->bytes.count - opening);
+    for (size_t first = 0, end; first < m->triangle_count || first == 0; first = end) {
+        const size_t start = bin->bytes.count;
+        const char *name = m->materials ? mesh_material_name(m, m->materials[first])
+                           : material   ? material->name
+                                        : NULL;
+        end = same_material(m, first);
+        for (size_t c = 3 * first; c < 3 * end; c++) {
+            if (is_short) sink_u16(bin, flat_index(f, c));
+            else sink_u32(bin, flat_index(f, c));
+        }
+        if (first > 0) {
+            sink_print(s, ",");
+            append(s, &attributes);
+        }
+        sink_print(s, "},\"indices\":%d,\"material\":%d}",
+                   glb_accessor(g, start, GL_ELEMENTS, is_short ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT,
+                                3 * (end - first), "SCALAR", NULL),
+                   glb_material(g, material, name));
+        if (end == 0) break;
+    }
+    const int ok = !attributes.failed;
+    list_free(&attributes.bytes);
+    return ok;
+}
+
 /* A primitive of the mesh that is being written. */
 static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *material) {
     flat_mesh f;
     sink *bin = &g->binary, *s = &g->meshes;
     float bounds[6] = {0, 0, 0, 0, 0, 0};
     size_t start = bin->bytes.count;
-    if (!flat_make(m, 1, &f)) return 0;
+    if (!flat_make(m, BY_NORMAL | (m->colors ? 0 : BY_FACE), &f)) return 0;
 
     for (size_t i = 0; i < f.count; i++) {
         const float *p = m->positions + 3 * flat_vertex(&f, i);
@@ -127,6 +184,7 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
         }
         sink_floats(bin, p, 3);
     }
+    const size_t opening = s->bytes.count;
     sink_print(s, "{\"attributes\":{\"POSITION\":%d",
                glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
     if (m->normals || m->corner_normals) {
@@ -143,26 +201,17 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
         sink_print(s, ",\"TEXCOORD_0\":%d",
                    glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
     }
-    if (m->colors) {
+    if (m->colors || m->face_colors) {
         start = bin->bytes.count;
-        for (size_t i = 0; i < f.count; i++) put_color(bin, m->colors + 4 * flat_vertex(&f, i));
+        for (size_t i = 0; i < f.count; i++) put_color(bin, flat_color(&f, i));
         sink_print(s, ",\"COLOR_0\":%d",
                    glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT | NORMALIZED, f.count, "VEC4",
                                 NULL));
     }
     if (m->joints) glb_weights(g, m, &f);
-    start = bin->bytes.count;
-    const int is_short = f.count < 65535; /* 65535 itself is not an index */
-    for (size_t c = 0; c < 3 * m->triangle_count; c++) {
-        if (is_short) sink_u16(bin, flat_index(&f, c));
-        else sink_u32(bin, flat_index(&f, c));
-    }
-    sink_print(s, "},\"indices\":%d,\"material\":%d}",
-               glb_accessor(g, start, GL_ELEMENTS, is_short ? GL_UNSIGNED_SHORT : GL_UNSIGNED_INT,
-                            3 * m->triangle_count, "SCALAR", NULL),
-               glb_material(g, material));
+    const int ok = glb_triangles(g, m, &f, opening, material);
     split_free(&f.split);
-    return 1;
+    return ok;
 }
 
 static void glb_open_mesh(glb *g) {
@@ -320,21 +369,55 @@ static void put_png(sink *s, const unsigned char *png, size_t size) {
     }
 }
 
-static void append(sink *to, const sink *from) {
-    sink_put(to, from->bytes.items, from->bytes.count);
-    to->failed |= from->failed;
+/* A string of JSON. */
+static void print_string(sink *s, const char *from) {
+    sink_put(s, "\"", 1);
+    for (; *from; from++) {
+        const unsigned char c = (unsigned char)*from;
+        if (c == '"' || c == '\\') sink_print(s, "\\%c", c);
+        else if (c < 32) sink_print(s, "\\u%04x", c);
+        else sink_put(s, from, 1);
+    }
+    sink_put(s, "\"", 1);
+}
+
+/* Does material i have a picture? *first: that of the first material with the same one. */
+static int has_picture(const glb *g, int i, int *first) {
+    const mesh_material *m = g->materials[i].material;
+    if (!m || !(m->png || m->texture)) return 0;
+    *first = 0;
+    while (g->materials[*first].material != m) ++*first;
+    return 1;
+}
+
+static void print_picture(glb *g, const mesh_material *m, sink *json) {
+    if (m->png) {
+        const size_t start = g->binary.bytes.count;
+        put_png(&g->binary, m->png, m->png_size);
+        sink_print(json, "{\"bufferView\":%d,\"mimeType\":\"image/png\"}", glb_view(g, start, 0));
+    } else {
+        sink_print(json, "{\"uri\":\"");
+        print_uri(json, m->texture);
+        sink_print(json, "\"}");
+    }
 }
 
 static void print_materials(glb *g, sink *json) {
-    int textures = 0;
+    enum { CLAMP = 33071, REPEAT = 10497 };
+    int number[MAX_MATERIALS], textures = 0, first = 0; /* number: of a material's picture */
     sink_print(json, ",\"materials\":[");
     for (int i = 0; i < g->material_count; i++) {
-        const mesh_material *m = g->materials[i];
+        const mesh_material *m = g->materials[i].material;
+        number[i] = -1;
+        if (has_picture(g, i, &first)) number[i] = first == i ? textures++ : number[first];
         sink_print(json, "%s{", i ? "," : "");
-        if (m && m->name) sink_print(json, "\"name\":\"%.60s\",", m->name);
+        if (g->materials[i].name) {
+            sink_print(json, "\"name\":");
+            print_string(json, g->materials[i].name);
+            sink_print(json, ",");
+        }
         sink_print(json, "\"pbrMetallicRoughness\":{");
-        if (m && (m->png || m->texture))
-            sink_print(json, "\"baseColorTexture\":{\"index\":%d},", textures++);
+        if (number[i] >= 0) sink_print(json, "\"baseColorTexture\":{\"index\":%d},", number[i]);
         sink_print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}");
         if (m && m->is_cut_out) sink_print(json, ",\"alphaMode\":\"MASK\",\"doubleSided\":true");
         sink_print(json, "}");
@@ -346,26 +429,16 @@ static void print_materials(glb *g, sink *json) {
         sink_print(json, "%s{\"sampler\":%d,\"source\":%d}", i ? "," : "", i, i);
     sink_print(json, "],\"samplers\":[");
     for (int i = 0, written = 0; i < g->material_count; i++) {
-        const mesh_material *m = g->materials[i];
-        if (!m || !(m->png || m->texture)) continue;
-        sink_print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":33071}",
-                   written++ ? "," : "", m->repeats ? 10497 : 33071);
+        const mesh_material *m = g->materials[i].material;
+        if (!has_picture(g, i, &first) || first != i) continue;
+        sink_print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":%d}",
+                   written++ ? "," : "", m->repeats ? REPEAT : CLAMP, m->repeats_down ? REPEAT : CLAMP);
     }
     sink_print(json, "],\"images\":[");
     for (int i = 0, written = 0; i < g->material_count; i++) {
-        const mesh_material *m = g->materials[i];
-        if (!m || !(m->png || m->texture)) continue;
-        sink_print(json, "%s{", written++ ? "," : "");
-        if (m->png) {
-            const size_t start = g->binary.bytes.count;
-            put_png(&g->binary, m->png, m->png_size);
-            sink_print(json, "\"bufferView\":%d,\"mimeType\":\"image/png\"}",
-                       glb_view(g, start, 0));
-        } else {
-            sink_print(json, "\"uri\":\"");
-            print_uri(json, m->texture);
-            sink_print(json, "\"}");
-        }
+        if (!has_picture(g, i, &first) || first != i) continue;
+        if (written++) sink_print(json, ",");
+        print_picture(g, g->materials[i].material, json);
     }
     sink_print(json, "]");
 }

@@ -7,6 +7,7 @@
 #include "mesh_file.h"
 
 #include <cjson/cJSON.h>
+#include <stdio.h>
 
 enum { GLB_HEADER = 12, CHUNK_HEADER = 8 };
 enum { CHUNK_JSON = 0x4e4f534a, CHUNK_BINARY = 0x004e4942 };
@@ -29,27 +30,12 @@ typedef struct items {
     size_t count;
 } items;
 
-/* What an accessor refers to; stride 0: not yet known. */
-typedef struct accessor {
-    const unsigned char *bytes; /* of the first element */
-    size_t count, stride;
-    int component, width, is_normalized;
-} accessor;
-
-/* A piece of the binary chunk; is_known: 0 not yet. */
-typedef struct view {
-    size_t start, length, stride; /* stride 0: as large as an element */
-    int is_known;
-} view;
-
 typedef struct gltf {
     builder *b;
     cJSON *json;
     const unsigned char *binary;
     size_t binary_size, room; /* room: for corners and vertices, see MOST_COPIES */
-    items accessors, views, meshes, nodes;
-    accessor *read_accessors; /* each is read once, as many primitives may refer to it */
-    view *read_views;
+    items accessors, views, meshes, nodes, materials;
     unsigned char *seen;      /* per node */
     list stack;               /* of pending */
 } gltf;
@@ -58,6 +44,13 @@ typedef struct pending {
     size_t node;
     matrix map;
 } pending;
+
+/* What an accessor refers to. */
+typedef struct accessor {
+    const unsigned char *bytes; /* of the first element */
+    size_t count, stride;
+    int component, width, is_normalized;
+} accessor;
 
 static size_t least_of(size_t a, size_t b) {
     return a < b ? a : b;
@@ -171,29 +164,10 @@ static int width_of(const cJSON *type) {
     return 0;
 }
 
-/* The view of this number, or NULL if it is damaged. */
-static const view *read_view(const gltf *g, size_t index) {
-    const cJSON *json = g->views.of[index].json;
-    view *v = &g->read_views[index];
-    size_t buffer = 0;
-    if (v->is_known) return v;
-    if (!get_size(json, "buffer", 0, &buffer) || /* the one in this file */
-        !get_size(json, "byteOffset", g->binary_size, &v->start) || !member(json, "byteLength") ||
-        !get_size(json, "byteLength", g->binary_size - v->start, &v->length) ||
-        !get_size(json, "byteStride", MOST_STRIDE, &v->stride))
-        return NULL;
-    v->is_known = 1;
-    return v;
-}
-
-static int read_accessor(const gltf *g, size_t index, accessor *to) {
-    const cJSON *json = g->accessors.of[index].json;
-    accessor *a = &g->read_accessors[index];
-    size_t component = 0, start = 0, view_index = 0;
-    if (a->stride) {
-        *to = *a;
-        return 1;
-    }
+static int read_accessor(const gltf *g, size_t index, accessor *a) {
+    const cJSON *json = g->accessors.of[index].json, *view;
+    size_t component = 0, start = 0, view_index = 0, view_start = 0, length = 0, buffer = 0;
+    memset(a, 0, sizeof *a);
     if (member(json, "sparse"))
         return builder_fail(g->b, 0, "accessor %lu is sparse, which is not read",
                             (unsigned long)index);
@@ -205,15 +179,21 @@ static int read_accessor(const gltf *g, size_t index, accessor *to) {
     a->width = width_of(member(json, "type"));
     a->is_normalized = cJSON_IsTrue(member(json, "normalized"));
     const size_t element = component_size(a->component) * (size_t)a->width;
-    const view *v = ok && element ? read_view(g, view_index) : NULL;
-    const size_t stride = v && v->stride ? v->stride : element;
-    ok = v && stride >= element && start <= v->length && element <= v->length - start &&
-         a->count - 1 <= (v->length - start - element) / stride;
+    ok = ok && element;
+    if (ok) {
+        view = g->views.of[view_index].json;
+        a->stride = element;
+        ok = get_size(view, "buffer", 0, &buffer) && /* the one in this file */
+             get_size(view, "byteOffset", g->binary_size, &view_start) &&
+             member(view, "byteLength") &&
+             get_size(view, "byteLength", g->binary_size - view_start, &length) &&
+             get_size(view, "byteStride", MOST_STRIDE, &a->stride) && a->stride >= element &&
+             start <= length && element <= length - start &&
+             a->count - 1 <= (length - start - element) / a->stride;
+    }
     if (!ok) return builder_fail(g->b, 0, "accessor %lu is out of range or damaged",
                                  (unsigned long)index);
-    a->bytes = g->binary + v->start + start;
-    a->stride = stride;
-    *to = *a;
+    a->bytes = g->binary + view_start + start;
     return 1;
 }
 
@@ -438,6 +418,34 @@ static int same_attributes(const attributes *a, const attributes *b) {
            a->color == b->color;
 }
 
+/* Use the material of a primitive, by its name. */
+static int use_material(gltf *g, const cJSON *json) {
+    builder *b = g->b;
+    size_t index = 0;
+    char number[40];
+    b->material = NO_MATERIAL;
+    if (!member(json, "material")) return 1;
+    if (!get_index(json, "material", g->materials.count, &index))
+        return builder_fail(b, 0, "a primitive whose material is out of range");
+    const cJSON *name = member(g->materials.of[index].json, "name");
+    snprintf(number, sizeof number, "material%lu", (unsigned long)index);
+    const char *used = cJSON_IsString(name) ? name->valuestring : number;
+    return builder_use_material(b, used, strlen(used));
+}
+
+/* Count what materials look like, which is not read: pictures, and colors other than white. */
+static void count_looks(gltf *g) {
+    const cJSON *at;
+    g->b->left_out[LEFT_LOOKS] += (size_t)cJSON_GetArraySize(member(g->json, "images"));
+    for (size_t i = 0; i < g->materials.count; i++) {
+        const cJSON *look = member(g->materials.of[i].json, "pbrMetallicRoughness");
+        int is_white = 1;
+        cJSON_ArrayForEach(at, member(look, "baseColorFactor"))
+            is_white &= cJSON_IsNumber(at) && at->valuedouble >= 1;
+        g->b->left_out[LEFT_LOOKS] += !is_white;
+    }
+}
+
 static int read_primitive(gltf *g, const cJSON *json, const double *map, vertices *v) {
     const cJSON *set = member(json, "attributes");
     attributes from = {SIZE_MAX, SIZE_MAX, SIZE_MAX, SIZE_MAX};
@@ -472,6 +480,7 @@ static int read_primitive(gltf *g, const cJSON *json, const double *map, vertice
             return builder_fail(g->b, 0, "indices that are no whole numbers");
         indices.is_normalized = 0;
     }
+    if (!use_material(g, json)) return 0;
     if (!(v->count && same_attributes(&from, &v->from)) && !add_vertices(g, &from, map, v)) return 0;
     return add_triangles(g, index != SIZE_MAX ? &indices : NULL, v, mode, determinant_of(map) < 0);
 }
@@ -584,9 +593,7 @@ static int read_node(gltf *g, const pending *p) {
 
 static int read_scene(gltf *g) {
     g->seen = (unsigned char *)calloc(g->nodes.count + 1, 1);
-    g->read_accessors = (accessor *)calloc(g->accessors.count + 1, sizeof(accessor));
-    g->read_views = (view *)calloc(g->views.count + 1, sizeof(view));
-    if (!g->seen || !g->read_accessors || !g->read_views) return builder_fail_memory(g->b);
+    if (!g->seen) return builder_fail_memory(g->b);
     int ok = push_roots(g);
     while (ok && g->stack.count) {
         const pending p = ((const pending *)g->stack.items)[--g->stack.count];
@@ -609,15 +616,16 @@ int mesh_read_glb(builder *b, const unsigned char *bytes, size_t size) {
     const int ok = read_chunks(&g, bytes, size) && check_extensions(&g) &&
                    get_items(&g, "accessors", &g.accessors) &&
                    get_items(&g, "bufferViews", &g.views) && get_items(&g, "meshes", &g.meshes) &&
-                   get_items(&g, "nodes", &g.nodes) && read_scene(&g);
+                   get_items(&g, "nodes", &g.nodes) &&
+                   get_items(&g, "materials", &g.materials) && read_scene(&g);
+    if (ok) count_looks(&g);
     cJSON_Delete(g.json);
     free(g.accessors.of);
     free(g.views.of);
     free(g.meshes.of);
     free(g.nodes.of);
+    free(g.materials.of);
     free(g.seen);
-    free(g.read_accessors);
-    free(g.read_views);
     list_free(&g.stack);
     return ok;
 }

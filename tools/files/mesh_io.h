@@ -47,6 +47,11 @@ typedef struct mesh_data {
     unsigned char *colors;               /* 4 per vertex, RGBA, or NULL                       */
     uint32_t *indices;                   /* 3 per triangle, each below vertex_count           */
     float *uvs;                          /* 2 per corner, so 6 per triangle, finite; or NULL  */
+    unsigned char *face_colors;          /* 4 per triangle, RGBA, or NULL                     */
+    uint32_t *materials;                 /* 1 per triangle, below material_count; or NULL     */
+    size_t material_count;
+    char *material_names;                /* one behind the other, each with a 0 at its end    */
+    char *library;                       /* OBJ: the name of the file of its materials, or NULL */
     float *corner_normals;               /* 3 per corner, or NULL; mesh_crease makes them     */
     uint32_t *joints;                    /* 4 per vertex, into a mesh_skeleton, or NULL; only */
     float *weights;                      /* 4 per vertex, sum 1           GLB files hold them */
@@ -71,8 +76,9 @@ typedef struct mesh_material {
     const char *texture; /* as that of mesh_scene, and the next two as well         */
     const unsigned char *png;
     size_t png_size;
-    int repeats;    /* the picture's left and right borders fit together                            */
+    int repeats;    /* the picture goes on beyond its left and right borders: these fit together    */
     int is_cut_out; /* where the picture's alpha is below 1/2 there is nothing; both sides are seen */
+    int repeats_down; /* as repeats, beyond its upper and lower borders                             */
 } mesh_material;
 
 /* Many copies of a small mesh. */
@@ -122,6 +128,7 @@ typedef struct mesh_scene {
     const char *extras;              /* GLB: a JSON object for the user, or NULL               */
     const mesh_instances *instances; /* each with triangles; GLB only: mesh_bake for the others */
     int instance_count;
+    int repeats;              /* GLB: that picture repeats both ways                             */
     const char *texture;      /* OBJ, GLB: name of the picture on the surface, '/' between folders;
                                  NULL = none                                                    */
     const unsigned char *png; /* GLB: the picture itself, to embed; NULL = refer to it by name  */
@@ -143,6 +150,14 @@ int mesh_decode(const unsigned char *bytes, size_t size, int flags, mesh_data *m
 
 /* The same from a path. */
 int mesh_read(const char *path, int flags, mesh_data *mesh, const char **why);
+
+/* Where are the seams of a mesh? Writes 3 numbers per triangle, one for each corner, into seams: equal
+   for corners in the same place whose triangles have the same material and whose texture coordinates are
+   the same up to rounding; those then become the very same. 0: no memory. */
+int mesh_seams(mesh_data *mesh, uint32_t *seams);
+
+/* The name of material i of a mesh; "" where the file names none. */
+const char *mesh_material_name(const mesh_data *m, size_t i);
 
 /* Release what the mesh owns; message and note stay. */
 void mesh_free(mesh_data *mesh);

@@ -19,11 +19,17 @@ static int read_numbers(text *in, double *values, int most) {
     }
 }
 
-/* v x y z [w] [r g b]; colors are gathered as floats, for some write them 0..255. */
-static int read_obj_vertex(builder *b, text *in, list *colors) {
-    double v[7];
+/* What stands behind x y z: nothing, w, r g b, w r g b or r g b a, w r g b a. */
+typedef struct obj_shade {
+    float v[5];
+    int count;
+} obj_shade;
+
+/* v x y z [w] [r g b [a]]; extra: a list of obj_shade, which begins with the first one that has any. */
+static int read_obj_vertex(builder *b, text *in, list *extra) {
+    double v[8];
     const size_t line = in->line;
-    const int n = read_numbers(in, v, 7);
+    const int n = read_numbers(in, v, 8);
     if (n < 0) return builder_fail(b, line, "a coordinate is not a number");
     if (n < 3) return builder_fail(b, line, "a vertex has less than three coordinates");
     double *p = (double *)list_add(&b->positions, 1);
@@ -31,15 +37,13 @@ static int read_obj_vertex(builder *b, text *in, list *colors) {
     memcpy(p, v, 3 * sizeof *p);
     if (!builder_check_position(b, b->positions.count - 1, line)) return 0;
     if (n < 6) return 1;
-    while (colors->count < b->positions.count) { /* white for those before that had none */
-        float *c = (float *)list_add(colors, 1);
-        if (!c) return builder_fail_memory(b);
-        c[0] = c[1] = c[2] = 1;
-        if (colors->count < b->positions.count) continue;
-        for (int k = 0; k < 3; k++) {
-            if (!text_to_float(v[n - 3 + k], &c[k]))
-                return builder_fail(b, line, "a color is not a finite number");
-        }
+    while (extra->count < b->positions.count) { /* none for those before that had none */
+        obj_shade *s = (obj_shade *)list_add(extra, 1);
+        if (!s) return builder_fail_memory(b);
+        s->count = 0;
+        if (extra->count < b->positions.count) continue;
+        s->count = n - 3;
+        for (int k = 0; k < s->count; k++) s->v[k] = (float)v[3 + k];
     }
     return 1;
 }
@@ -98,22 +102,70 @@ static int read_obj_face(builder *b, text *in) {
     return builder_add_polygon(b, first, line);
 }
 
-/* Colors to bytes; all 0..1, or if any is above, all 0..255. */
-static int obj_colors_to_bytes(builder *b, const list *colors) {
-    const float *from = (const float *)colors->items;
-    float most = 1;
-    if (colors->count == 0) return 1;
-    for (size_t i = 0; i < 3 * colors->count; i++) {
-        if (from[i] > most) most = from[i];
+/* Of four numbers behind x y z, is the first one w? It is if it is 1 in all of the file, and the last
+   one, which may be alpha, is not. */
+static int has_weights(const list *extra) {
+    const obj_shade *s = (const obj_shade *)extra->items;
+    int weights = 1, alphas = 1;
+    for (size_t i = 0; i < extra->count; i++) {
+        if (s[i].count != 4) continue;
+        weights &= s[i].v[0] >= 1 && s[i].v[0] <= 1;
+        alphas &= s[i].v[3] >= 1 && s[i].v[3] <= 1;
     }
-    const float scale = most > 1 ? 1 : 255;
+    return weights && !alphas;
+}
+
+static int obj_colors_to_bytes(builder *b, const list *extra) {
+    const obj_shade *from = (const obj_shade *)extra->items;
+    const int weights = has_weights(extra);
+    if (extra->count == 0) return 1;
+    shade *shades = (shade *)malloc(b->positions.count * sizeof *shades);
     unsigned char *to = (unsigned char *)list_add(&b->colors, b->positions.count);
-    if (!to) return builder_fail_memory(b);
-    memset(to, 255, 4 * b->positions.count);
-    for (size_t i = 0; i < colors->count; i++) {
-        for (size_t k = 0; k < 3; k++)
-            to[4 * i + k] = (unsigned char)(txm_clampf(from[3 * i + k] * scale, 0, 255) + 0.5f);
+    if (!shades || !to) {
+        free(shades);
+        return builder_fail_memory(b);
     }
+    for (size_t i = 0; i < b->positions.count; i++) {
+        const int n = i < extra->count ? from[i].count : 0;
+        const int first = n == 5 || (n == 4 && weights), has_alpha = n - first == 4;
+        shades[i] = shade_none();
+        if (n == 0) continue;
+        for (int k = 0; k < 3; k++) shades[i].c[k] = from[i].v[first + k];
+        shades[i].c[3] = has_alpha ? txm_maxf(from[i].v[first + 3], 0) : SHADE_OPAQUE;
+    }
+    b->left_out[LEFT_COLORS] += shades_to_bytes(shades, b->positions.count, 0, to);
+    free(shades);
+    return 1;
+}
+
+/* The rest of the line, without blanks at either end. */
+static size_t read_obj_name(text *in, const char **name) {
+    while (in->at < in->end && is_blank(*in->at)) in->at++;
+    *name = in->at;
+    while (in->at < in->end && !is_line_end(*in->at)) in->at++;
+    const char *end = in->at;
+    while (end > *name && is_blank(end[-1])) end--;
+    return (size_t)(end - *name);
+}
+
+static int read_obj_material(builder *b, text *in) {
+    const char *name;
+    const size_t n = read_obj_name(in, &name);
+    return builder_use_material(b, name, n);
+}
+
+/* The first one counts; the others are said to be left out. */
+static int read_obj_library(builder *b, text *in) {
+    const char *name;
+    const size_t n = read_obj_name(in, &name);
+    if (b->library.count || n == 0) {
+        b->left_out[LEFT_LIBRARIES] += n > 0;
+        return 1;
+    }
+    char *to = (char *)list_add(&b->library, n + 1);
+    if (!to) return builder_fail_memory(b);
+    memcpy(to, name, n);
+    to[n] = 0;
     return 1;
 }
 
@@ -141,7 +193,7 @@ static void skip_obj_line(text *in, const char *word, size_t n) {
 }
 
 int mesh_read_obj(builder *b, text *in) {
-    list colors = list_of(3 * sizeof(float));
+    list colors = list_of(sizeof(obj_shade));
     int ok = 1;
     in->joins = 1;
     while (ok && in->at < in->end) {
@@ -150,6 +202,8 @@ int mesh_read_obj(builder *b, text *in) {
         if (is_word(word, n, "v")) ok = read_obj_vertex(b, in, &colors);
         else if (is_word(word, n, "vt")) ok = read_obj_uv(b, in);
         else if (is_word(word, n, "f") || is_word(word, n, "fo")) ok = read_obj_face(b, in);
+        else if (is_word(word, n, "usemtl")) ok = read_obj_material(b, in);
+        else if (is_word(word, n, "mtllib")) ok = read_obj_library(b, in);
         if (ok) skip_obj_line(in, word, n);
     }
     ok = ok && obj_colors_to_bytes(b, &colors);
@@ -199,7 +253,7 @@ int mesh_decode_lines(const unsigned char *bytes, size_t size, const mesh_place 
     builder b;
     mesh_data message;
     text in = text_of(bytes, size);
-    list colors = list_of(3 * sizeof(float)), points = list_of(3 * sizeof(float));
+    list colors = list_of(sizeof(obj_shade)), points = list_of(3 * sizeof(float));
     list firsts = list_of(sizeof(size_t));
     memset(lines, 0, sizeof *lines);
     memset(&message, 0, sizeof message);
@@ -258,14 +312,24 @@ typedef struct obj_counts {
     size_t vertices, uvs, normals;
 } obj_counts;
 
+/* How many numbers of a color the vertices have: alpha only if some of it is not opaque. */
+static size_t color_width(const mesh_data *m) {
+    if (!m->colors) return 0;
+    for (size_t i = 0; i < m->vertex_count; i++) {
+        if (m->colors[4 * i + 3] != 255) return 4;
+    }
+    return 3;
+}
+
 static void print_obj_vertices(sink *s, const mesh_data *m, const mesh_place *place,
                                const split *uvs, const split *normals, size_t normal_count) {
+    const size_t width = color_width(m);
     const int digits = place_digits(place, m);
     for (size_t i = 0; i < m->vertex_count; i++) {
         const float *p = m->positions + 3 * i;
         sink_print(s, "v %.*g %.*g %.*g", digits, mesh_place_out(place, p[0], 0), digits,
                    mesh_place_out(place, p[1], 1), digits, mesh_place_out(place, p[2], 2));
-        for (size_t k = 0; k < 3 && m->colors; k++)
+        for (size_t k = 0; k < width; k++)
             sink_print(s, " %.4g", m->colors[4 * i + k] / 255.0);
         sink_put(s, "\n", 1);
     }
@@ -295,9 +359,14 @@ static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_c
     const size_t normal_count = normals.index ? normals.count : m->normals ? m->vertex_count : 0;
     if (scene->part_count) sink_print(s, "o %.60s\n", part->material->name);
     print_obj_vertices(s, m, &scene->place, &uvs, &normals, normal_count);
-    if (scene->library) sink_print(s, "usemtl %.60s\n", part->material->name);
+    const int is_named = scene->library || m->materials; /* a name for all, or of each triangle */
+    if (is_named && !m->materials) sink_print(s, "usemtl %.60s\n", part->material->name);
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
-        const size_t v = m->indices[c] + 1;
+        const size_t v = m->indices[c] + 1, t = c / 3;
+        if (c % 3 == 0 && m->materials && (t == 0 || m->materials[t] != m->materials[t - 1])) {
+            sink_print(s, "usemtl ");
+            print_name(s, mesh_material_name(m, m->materials[t]));
+        }
         sink_print(s, "%s%lu", c % 3 ? " " : "f ", (unsigned long)(counts->vertices + v));
         if (uvs.index) sink_print(s, "/%lu", (unsigned long)(counts->uvs + uvs.index[c] + 1));
         const size_t normal = counts->normals + (normals.index ? normals.index[c] + 1 : v);
@@ -315,9 +384,11 @@ static int encode_obj_part(const mesh_scene *scene, const mesh_part *part, obj_c
 int mesh_write_obj(const mesh_scene *scene, sink *s) {
     obj_counts counts = {0, 0, 0};
     mesh_material own;
-    if (scene->library) {
+    const char *library = scene->library;
+    if (!library && scene->surface && scene->surface->materials) library = scene->surface->library;
+    if (library) {
         sink_print(s, "mtllib ");
-        print_name(s, scene->library);
+        print_name(s, library);
     }
     for (int i = 0; i < scene_part_count(scene); i++) {
         const mesh_part part = scene_part(scene, i, &own);
@@ -326,19 +397,28 @@ int mesh_write_obj(const mesh_scene *scene, sink *s) {
     return 1;
 }
 
+static void print_material(sink *s, const char *name, const mesh_material *m) {
+    sink_print(s, "newmtl ");
+    print_name(s, name);
+    sink_print(s, "Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+    if (!m->texture) return;
+    sink_print(s, "map_Kd ");
+    print_name(s, m->texture);
+    if (!m->is_cut_out) return;
+    sink_print(s, "map_d ");
+    print_name(s, m->texture);
+}
+
 int mesh_encode_mtl(const mesh_scene *scene, unsigned char **bytes, size_t *size,
                     const char **why) {
     sink s = sink_new();
     mesh_material own;
     for (int i = 0; i < scene_part_count(scene); i++) {
-        const mesh_material *m = scene_part(scene, i, &own).material;
-        sink_print(&s, "newmtl %.60s\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\n", m->name);
-        if (!m->texture) continue;
-        sink_print(&s, "map_Kd ");
-        print_name(&s, m->texture);
-        if (!m->is_cut_out) continue;
-        sink_print(&s, "map_d ");
-        print_name(&s, m->texture);
+        const mesh_part part = scene_part(scene, i, &own);
+        const size_t count = part.mesh->materials ? part.mesh->material_count : 0;
+        for (size_t k = 0; k < count; k++)
+            print_material(&s, mesh_material_name(part.mesh, k), part.material);
+        if (count == 0) print_material(&s, part.material->name, part.material);
     }
     return sink_finish(&s, bytes, size, why);
 }

@@ -103,10 +103,28 @@ static int read_vertex(builder *b, const off_kind *kind, text *in, list *colors)
         to[1] = (float)v[end + 1];
     }
     if (end - at < 3) return 1;
-    float *to = (float *)list_add(colors, 1);
-    if (!to) return builder_fail_memory(b);
-    for (int k = 0; k < 4; k++) to[k] = at < end ? (float)v[at++] : -1;
+    shade *s = (shade *)list_add(colors, 1);
+    if (!s) return builder_fail_memory(b);
+    s->c[3] = SHADE_OPAQUE;
+    for (int k = 0; k < 4 && at < end; k++) s->c[k] = (float)v[at++];
+    if (s->c[3] < 0 && s->c[3] > SHADE_OPAQUE) s->c[3] = 0;
     return 1;
+}
+
+/* Behind the corners of a face: a color of three or four numbers, or the number of one of a map of
+   colors that no file holds. */
+static int read_face_color(text *in, shade *s) {
+    double v[4];
+    int n = 0;
+    while (n < 4) {
+        text_skip_blanks(in);
+        if (in->at == in->end || is_line_end(*in->at) || *in->at == '#') break;
+        if (!text_number(in, &v[n])) break;
+        n++;
+    }
+    for (int k = 0; k < n && n >= 3; k++) s->c[k] = (float)v[k];
+    if (n == 4) s->c[3] = txm_maxf(s->c[3], 0);
+    return n >= 3;
 }
 
 static int read_face(builder *b, text *in, int has_uv) {
@@ -123,31 +141,25 @@ static int read_face(builder *b, text *in, int has_uv) {
         if (!read_count(b, in, "a face with an index", &c[k].vertex)) return 0;
         c[k].uv = has_uv ? c[k].vertex : NO_UV;
     }
-    text_skip_blanks(in);
-    b->left_out[LEFT_FACE_COLORS] += in->at < in->end && !is_line_end(*in->at) && *in->at != '#';
+    const size_t before = b->polygons.count;
+    shade s = {{0, 0, 0, SHADE_OPAQUE}};
+    const int found = read_face_color(in, &s);
     text_skip_line(in);
-    return builder_add_polygon(b, first, line);
+    if (!builder_add_polygon(b, first, line)) return 0;
+    return found && b->polygons.count > before ? builder_face_shade(b, &s) : 1;
 }
 
-/* Colors to bytes; all 0..1, or if any is above, all 0..255. */
 static int take_colors(builder *b, const list *colors) {
-    const float *from = (const float *)colors->items;
-    float most = 0;
-    for (size_t i = 0; i < 4 * colors->count; i++) most = from[i] > most ? from[i] : most;
-    const float scale = most > 1 ? 1 : 255;
     unsigned char *to = (unsigned char *)list_add(&b->colors, colors->count);
     if (!to) return builder_fail_memory(b);
-    for (size_t i = 0; i < 4 * colors->count; i++) {
-        const float value = from[i] >= 0 ? txm_clampf(from[i] * scale, 0, 255) : 255;
-        to[i] = (unsigned char)((i & 3) != 3 && !(from[i] >= 0) ? 0 : value + 0.5f);
-    }
+    b->left_out[LEFT_COLORS] += shades_to_bytes((shade *)colors->items, colors->count, 0, to);
     return 1;
 }
 
 /* ---- the file ---------------------------------------------------------------------------- */
 
 int mesh_read_off(builder *b, text *in) {
-    list colors = list_of(4 * sizeof(float));
+    list colors = list_of(sizeof(shade));
     off_kind kind;
     int is_3d;
     uint32_t vertices, faces;

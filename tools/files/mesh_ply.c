@@ -3,6 +3,7 @@
 #include "mesh_file.h"
 
 #include <errno.h>
+#include <stdio.h>
 
 enum {
     MAX_ELEMENTS = 32,   /* of a file           */
@@ -25,6 +26,8 @@ typedef enum ply_role {
     PLY_X, PLY_Y, PLY_Z, PLY_NX, PLY_NY, PLY_NZ, PLY_RED, PLY_GREEN, PLY_BLUE, PLY_ALPHA, PLY_U,
     PLY_V, PLY_QX, PLY_QY, PLY_QZ, PLY_QW, PLY_ROLES,
     PLY_CORNERS = PLY_ROLES, /* of a face: its vertices; of strips: theirs, -1 between two */
+    PLY_TEXCOORD,            /* of a face: u v for each of them */
+    PLY_TEXTURE,             /* of a face: the number of its texture or material */
     PLY_OTHER
 } ply_role;
 
@@ -43,6 +46,7 @@ typedef struct ply {
     ply_element elements[MAX_ELEMENTS];
     ply_property properties[MAX_PROPERTIES];
     int element_count, property_count;
+    int has_uvs; /* of its vertices */
 } ply;
 
 static ply_type ply_type_of(const char *word) {
@@ -73,9 +77,16 @@ static ply_role ply_role_of(const ply_element *e, const ply_property *p, const c
     const int is_faces = e->is_face || e->is_strips;
     if (is_faces && is_list && (!strcmp(word, "vertex_indices") || !strcmp(word, "vertex_index")))
         return PLY_CORNERS;
-    if (!e->is_vertex || is_list) return PLY_OTHER;
+    if (e->is_face && is_list && !strcmp(word, "texcoord")) return PLY_TEXCOORD;
+    if (e->is_face && !is_list &&
+        (!strcmp(word, "texnumber") || !strcmp(word, "material_index")))
+        return PLY_TEXTURE;
+    if (!(e->is_vertex || e->is_face) || is_list) return PLY_OTHER;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        if (!strcmp(word, names[i].name)) return names[i].role;
+        if (strcmp(word, names[i].name) != 0) continue;
+        return e->is_vertex || (names[i].role >= PLY_RED && names[i].role <= PLY_ALPHA)
+                   ? names[i].role
+                   : PLY_OTHER;
     }
     return PLY_OTHER;
 }
@@ -245,12 +256,6 @@ static int skip_property(const builder *b, const ply *h, text *in, const ply_pro
     return 1;
 }
 
-static unsigned char to_byte(double value, ply_type type) {
-    if (type == PLY_FLOAT || type == PLY_DOUBLE) value *= 255;
-    if (type == PLY_UINT16) value /= 257;
-    return (unsigned char)(value > 0 ? value < 255 ? value + 0.5 : 255 : 0); /* NaN: 0 */
-}
-
 /* Do the vertices have all of a group of properties? */
 static int has_roles(const unsigned char *has, ply_role first, int count) {
     for (int k = 0; k < count; k++) {
@@ -259,16 +264,57 @@ static int has_roles(const unsigned char *has, ply_role first, int count) {
     return 1;
 }
 
+/* The roles that an element has, and how its colors are written. */
+typedef struct ply_roles {
+    unsigned char has[PLY_ROLES];
+    ply_type types[PLY_ROLES];
+    int whole; /* colors are integers                                     */
+    int mixed; /* of several types: then each is brought to 0..1 by its own */
+} ply_roles;
+
+static ply_roles find_roles(const ply *h, const ply_element *e) {
+    const ply_property *p = h->properties + e->first;
+    ply_roles r;
+    memset(&r, 0, sizeof r);
+    r.whole = 1;
+    for (int i = 0; i < e->properties; i++) {
+        if (p[i].role >= PLY_ROLES) continue;
+        r.has[p[i].role] = 1;
+        r.types[p[i].role] = p[i].type;
+    }
+    for (int k = PLY_RED; k <= PLY_ALPHA; k++) {
+        if (!r.has[k]) continue;
+        r.whole &= r.types[k] != PLY_FLOAT && r.types[k] != PLY_DOUBLE;
+        r.mixed |= r.types[k] != r.types[PLY_RED];
+    }
+    r.whole &= !r.mixed;
+    return r;
+}
+
+/* A channel. Signed bytes below 0 are meant to be unsigned. */
+static float channel_of(const ply_roles *r, int role, double v) {
+    const ply_type type = r->types[role];
+    if (type == PLY_INT8 && v < 0) v += 256;
+    if (!r->mixed || type == PLY_FLOAT || type == PLY_DOUBLE) return (float)v;
+    return (float)(v / (type == PLY_INT16 || type == PLY_UINT16 ? 65535 : 255));
+}
+
+/* A color from the values of its roles. */
+static shade shade_of(const ply_roles *r, const double *v) {
+    shade s = {{0, 0, 0, SHADE_OPAQUE}};
+    for (int k = 0; k < 4; k++) {
+        const int role = PLY_RED + k;
+        if (r->has[role]) s.c[k] = channel_of(r, role, v[role]);
+    }
+    if (r->has[PLY_ALPHA]) s.c[3] = txm_maxf(s.c[3], 0);
+    return s;
+}
+
 static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, text *in) {
-    unsigned char has[PLY_ROLES] = {0};
-    ply_type types[PLY_ROLES] = {PLY_INT8};
+    const ply_roles roles = find_roles(h, e);
+    const unsigned char *has = roles.has;
     double v[PLY_ROLES] = {0};
     const ply_property *properties = h->properties + e->first;
-    for (int i = 0; i < e->properties; i++) {
-        if (properties[i].role >= PLY_ROLES) continue;
-        has[properties[i].role] = 1;
-        types[properties[i].role] = properties[i].type;
-    }
     if (!has_roles(has, PLY_X, 3)) return builder_fail(b, 0, "its vertices have no x, y and z");
     const int has_normal = has_roles(has, PLY_NX, 3), has_color = has_roles(has, PLY_RED, 3);
     const int has_uv = has_roles(has, PLY_U, 2), has_rotation = has_roles(has, PLY_QX, 4);
@@ -276,9 +322,10 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
     float *normal = has_normal ? (float *)list_add(&b->normals, e->count) : NULL;
     float *uv = has_uv ? (float *)list_add(&b->uvs, e->count) : NULL;
     float *rotation = has_rotation ? (float *)list_add(&b->rotations, e->count) : NULL;
+    shade *shades = has_color ? (shade *)list_add(&b->vertex_shades, e->count) : NULL;
     unsigned char *color = has_color ? (unsigned char *)list_add(&b->colors, e->count) : NULL;
     if (!position || (has_normal && !normal) || (has_uv && !uv) || (has_color && !color) ||
-        (has_rotation && !rotation))
+        (has_color && !shades) || (has_rotation && !rotation))
         return builder_fail_memory(b);
 
     for (size_t i = 0; i < e->count; i++) {
@@ -301,11 +348,9 @@ static int read_ply_vertices(builder *b, const ply *h, const ply_element *e, tex
         if (!ok)
             return builder_fail(b, 0, "vertex %lu has a rotation that is not finite",
                                 (unsigned long)i + 1);
-        for (int k = 0; k < 4 && has_color; k++)
-            color[4 * i + (size_t)k] = k == 3 && !has[PLY_ALPHA]
-                                           ? 255
-                                           : to_byte(v[PLY_RED + k], types[PLY_RED + k]);
+        if (has_color) shades[i] = shade_of(&roles, v);
     }
+    if (has_color) b->left_out[LEFT_COLORS] += shades_to_bytes(shades, e->count, roles.whole, color);
     return 1;
 }
 
@@ -315,7 +360,7 @@ static int read_ply_index(const builder *b, const ply *h, const ply_property *p,
     double value;
     if (!read_scalar(h, in, p->type, &value)) return fail_body(b, h, in);
     *index = NO_VERTEX;
-    if (is_strip && (value == -1 || value == 4294967295.0)) return 1; /* -1 without a sign */
+    if (is_strip && value == -1) return 1;
     if (!(value >= 0 && value < 2147483648.0) || value != floor(value))
         return builder_fail(b, h->format == PLY_ASCII ? in->line : 0,
                             "a face with an index that is out of range");
@@ -333,9 +378,74 @@ static int read_ply_face(builder *b, const ply *h, const ply_property *p, text *
     if (!c) return builder_fail_memory(b);
     for (size_t k = 0; k < n; k++) {
         if (!read_ply_index(b, h, p, in, 0, &c[k].vertex)) return 0;
-        c[k].uv = c[k].vertex;
+        c[k].uv = h->has_uvs ? c[k].vertex : NO_UV;
     }
     return builder_add_polygon(b, first, line);
+}
+
+/* The u v of the corners of the face that is being read, for read_ply_dress. */
+static int read_ply_texcoords(builder *b, const ply *h, const ply_property *p, text *in) {
+    size_t n;
+    if (!read_length(b, h, in, p, &n)) return 0;
+    b->texcoords.count = 0;
+    float *to = (float *)list_add(&b->texcoords, n);
+    if (!to) return builder_fail_memory(b);
+    for (size_t k = 0; k < n; k++) {
+        double value;
+        if (!read_scalar(h, in, p->type, &value)) return fail_body(b, h, in);
+        to[k] = (float)value;
+    }
+    return 1;
+}
+
+/* Give the corners of the last face their texture coordinates. */
+static int take_texcoords(builder *b) {
+    const polygon *f = (const polygon *)b->polygons.items + b->polygons.count - 1;
+    corner *c = (corner *)b->corners.items + f->first;
+    if (b->texcoords.count != 2 * f->count) return 1; /* none of its own */
+    const size_t first = b->uvs.count;
+    float *to = (float *)list_add(&b->uvs, f->count);
+    if (!to) return builder_fail_memory(b);
+    memcpy(to, b->texcoords.items, 2 * f->count * sizeof(float));
+    for (size_t k = 0; k < f->count; k++) c[k].uv = (uint32_t)(first + k);
+    return 1;
+}
+
+static int use_texture(builder *b, double number) {
+    char name[32];
+    const int n = snprintf(name, sizeof name, "texture%.0f", number);
+    return builder_use_material(b, name, (size_t)n);
+}
+
+/* A face with all that it carries, in whatever order. */
+static int read_ply_polygon(builder *b, const ply *h, const ply_element *e, text *in,
+                            const ply_roles *roles) {
+    double v[PLY_ROLES] = {0}, texture = -1;
+    const size_t before = b->polygons.count;
+    b->texcoords.count = 0;
+    for (int k = 0; k < e->properties; k++) {
+        const ply_property *p = &h->properties[e->first + k];
+        int ok;
+        if (p->role == PLY_CORNERS) ok = read_ply_face(b, h, p, in);
+        else if (p->role == PLY_TEXCOORD) ok = read_ply_texcoords(b, h, p, in);
+        else if (p->role == PLY_TEXTURE || p->role < PLY_ROLES)
+            ok = read_scalar(h, in, p->type, p->role == PLY_TEXTURE ? &texture : &v[p->role])
+                     ? 1
+                     : fail_body(b, h, in);
+        else ok = skip_property(b, h, in, p);
+        if (!ok) return 0;
+    }
+    if (b->polygons.count == before) return 1;
+    if (has_roles(roles->has, PLY_RED, 3)) {
+        const shade s = shade_of(roles, v);
+        b->whole_face_shades = roles->whole;
+        if (!builder_face_shade(b, &s)) return 0;
+    }
+    if (texture >= 0 && texture < 1e9) {
+        if (!use_texture(b, floor(texture))) return 0;
+        ((polygon *)b->polygons.items)[before].material = b->material;
+    }
+    return take_texcoords(b);
 }
 
 /* Triangles of three successive vertices each, every second one turned round. -1 begins anew. */
@@ -344,7 +454,7 @@ static int read_ply_strips(builder *b, const ply *h, const ply_property *p, text
     strip s = strip_begin();
     if (!read_length(b, h, in, p, &n)) return 0;
     for (size_t k = 0; k < n; k++) {
-        uint32_t index;
+        uint32_t index = NO_VERTEX;
         if (!read_ply_index(b, h, p, in, 1, &index)) return 0;
         if (index == NO_VERTEX) s = strip_begin();
         else if (!strip_add(b, &s, index)) return 0;
@@ -364,12 +474,13 @@ static int read_ply_elements(builder *b, const ply *h, const ply_element *e, tex
     }
     if (e->is_face && !list_reserve(&b->corners, b->corners.count + 3 * e->count))
         return builder_fail_memory(b);
+    const ply_roles roles = find_roles(h, e);
     for (size_t i = 0; i < e->count; i++) {
-        for (int k = 0; k < e->properties; k++) {
+        if (e->is_face && !read_ply_polygon(b, h, e, in, &roles)) return 0;
+        for (int k = 0; k < e->properties && !e->is_face; k++) {
             const ply_property *p = &h->properties[e->first + k];
-            const int ok = p->role != PLY_CORNERS ? skip_property(b, h, in, p)
-                           : e->is_strips         ? read_ply_strips(b, h, p, in)
-                                                  : read_ply_face(b, h, p, in);
+            const int ok = p->role == PLY_CORNERS ? read_ply_strips(b, h, p, in)
+                                                  : skip_property(b, h, in, p);
             if (!ok) return 0;
         }
     }
@@ -379,6 +490,10 @@ static int read_ply_elements(builder *b, const ply *h, const ply_element *e, tex
 int mesh_read_ply(builder *b, text *in, int points_too) {
     ply h;
     if (!read_ply_header(b, &h, in)) return 0;
+    for (int i = 0; i < h.element_count; i++) {
+        const ply_roles roles = find_roles(&h, &h.elements[i]);
+        if (h.elements[i].is_vertex) h.has_uvs |= has_roles(roles.has, PLY_U, 2);
+    }
     for (int i = 0; i < h.element_count; i++) {
         if (!read_ply_elements(b, &h, &h.elements[i], in)) return 0;
     }
@@ -395,19 +510,19 @@ int mesh_read_ply(builder *b, text *in, int points_too) {
 int mesh_write_ply(const mesh_data *m, const mesh_place *place, sink *s) {
     const int is_plain = place_is_plain(place); /* else floats would lose the shape */
     const char *type = is_plain ? "float" : "double";
+    const char *colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                         "property uchar alpha\n";
     flat_mesh f;
     if (!flat_make(m, 0, &f)) return 0;
     sink_print(s, "ply\nformat binary_little_endian 1.0\nelement vertex %lu\n",
                (unsigned long)f.count);
     sink_print(s, "property %s x\nproperty %s y\nproperty %s z\n", type, type, type);
     if (m->normals) sink_print(s, "property float nx\nproperty float ny\nproperty float nz\n");
-    if (m->colors)
-        sink_print(s, "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-                      "property uchar alpha\n");
+    if (m->colors) sink_print(s, "%s", colors);
     if (m->uvs) sink_print(s, "property float s\nproperty float t\n");
     if (m->triangle_count)
-        sink_print(s, "element face %lu\nproperty list uchar int vertex_indices\n",
-                   (unsigned long)m->triangle_count);
+        sink_print(s, "element face %lu\nproperty list uchar int vertex_indices\n%s",
+                   (unsigned long)m->triangle_count, m->face_colors ? colors : "");
     sink_print(s, "end_header\n");
     for (size_t i = 0; i < f.count; i++) {
         const size_t v = flat_vertex(&f, i);
@@ -426,6 +541,7 @@ int mesh_write_ply(const mesh_data *m, const mesh_place *place, sink *s) {
     for (size_t c = 0; c < 3 * m->triangle_count; c++) {
         if (c % 3 == 0) sink_put(s, "\3", 1);
         sink_u32(s, flat_index(&f, c));
+        if (c % 3 == 2 && m->face_colors) sink_put(s, m->face_colors + 4 * (c / 3), 4);
     }
     split_free(&f.split);
     return 1;

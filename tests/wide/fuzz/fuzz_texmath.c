@@ -5,10 +5,9 @@
    matter, and what is known stays as it is.                                                       */
 #include "texmath.h"
 
-#define FUZZ_BYTES 160
 #include "fuzzkit.h"
 
-enum { MOST_SIDE = 40 };
+enum { USED = 160, MOST_SIDE = 40 };
 
 /* Views with fields of any value: a check must say what is wrong without a look at the pixels. */
 static void view(source *s) {
@@ -158,7 +157,7 @@ static void cut(pool *p, source *s) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static pool p;
-    source s = source_of(data, size);
+    source s = {data, size, 0};
     switch (pick(&s, 6)) {
     case 0: view(&s); break;
     case 1: halve(&p, &s); break;
@@ -170,3 +169,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     drain(&p);
     return 0;
 }
+
+#ifdef FUZZ_STANDALONE
+int main(int argc, char **argv) {
+    return fuzz_main(argc, argv, USED);
+}
+#endif
