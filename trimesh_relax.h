@@ -2610,14 +2610,15 @@ static double tmr_quality(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 n) {
 static int tmr_ideal_valence(const tmr_mesh *m, int32_t v) {
     return tmr_kind_of(m, v) == TRIMESH_BORDER ? 5 : 6;
 }
-static int tmr_valence_cost(const tmr_mesh *m, int32_t v, int change) {
+/* what it costs to have others: their square, of up to millions */
+static int64_t tmr_valence_cost(const tmr_mesh *m, int32_t v, int change) {
     if (tmr_kind_of(m, v) == TRIMESH_CORNER) return 0;
-    const int d = m->valence[v] + change - tmr_ideal_valence(m, v);
+    const int64_t d = (int64_t)m->valence[v] + change - tmr_ideal_valence(m, v);
     return d * d;
 }
 
 /* by how much flipping the edge opposite to c would lower the cost of valences */
-static int tmr_flip_gain(const tmr_mesh *m, int32_t c) {
+static int64_t tmr_flip_gain(const tmr_mesh *m, int32_t c) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
     return tmr_valence_cost(m, a, 0) + tmr_valence_cost(m, b, 0) + tmr_valence_cost(m, d, 0) +
@@ -3641,11 +3642,14 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
 
 /* ---- the right number --------------------------------------------------------------------- */
 
+/* costs above this rank alike: keys, which have three decimals, have 32 bits */
+enum { TMR_MOST_COST = 4000000 };
+
 /* how collapsing (sign -1) or splitting (+1) the edge of c would change the cost of valences */
-static int tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
+static int64_t tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
-    int cost = 0;
+    int64_t cost = 0;
     if (!tmr_is_ghost(m, d)) cost += tmr_valence_cost(m, d, sign) - tmr_valence_cost(m, d, 0);
     if (!tmr_is_ghost(m, e)) cost += tmr_valence_cost(m, e, sign) - tmr_valence_cost(m, e, 0);
     if (sign > 0) return cost + 4;
@@ -3694,7 +3698,9 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
             const double size = tmr_edge_size(w, c);
             if (sign > 0 && size < 0.6 && pass < 30) continue;
             TRIMESH_ASSERT(count < most);
-            pairs[count].key = (uint32_t)(1000 * (100 + tmr_count_cost(m, c, sign)) -
+            const int64_t full = tmr_count_cost(m, c, sign);
+            const int64_t cost = full < TMR_MOST_COST ? full : TMR_MOST_COST;
+            pairs[count].key = (uint32_t)(1000 * (100 + cost) -
                                           sign * (int)(300 * fmin(size, 3)) +
                                           (m->edge[c] ? 2000 : 0));
             pairs[count++].value = (uint32_t)c;
@@ -5326,6 +5332,13 @@ static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     return tmr_surface_source(s, w->desc, &at);
 }
 
+/* The normal at vertex v: where those around cancel out, as on a sheet folded onto itself, that of the
+   face in which it lies. */
+static txm_dvec3 tmr_normal_of(const tmr_work *w, int32_t v) {
+    const txm_dvec3 n = w->m.n[v];
+    return n.x != 0 || n.y != 0 || n.z != 0 ? n : w->s->normal[tmr_face_of(w, v)];
+}
+
 /* Make the result, in the caller's units. */
 static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
     const tmr_mesh *m = &w->m;
@@ -5356,13 +5369,14 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         TRIMESH_ASSERT(mesh->vertex_count < (size_t)m->live);
         const size_t k = mesh->vertex_count++;
         const txm_dvec3 p = txm_d3_add(txm_d3_scale(m->p[v], s->diagonal), s->centre);
+        const txm_dvec3 normal = tmr_normal_of(w, v);
         number[v] = (int32_t)k;
         mesh->positions[3 * k] = txm_float(p.x);
         mesh->positions[3 * k + 1] = txm_float(p.y);
         mesh->positions[3 * k + 2] = txm_float(p.z);
-        mesh->normals[3 * k] = txm_float(m->n[v].x);
-        mesh->normals[3 * k + 1] = txm_float(m->n[v].y);
-        mesh->normals[3 * k + 2] = txm_float(m->n[v].z);
+        mesh->normals[3 * k] = txm_float(normal.x);
+        mesh->normals[3 * k + 1] = txm_float(normal.y);
+        mesh->normals[3 * k + 2] = txm_float(normal.z);
         mesh->kinds[k] = (uint8_t)tmr_kind_of(m, v);
         mesh->sources[k] = tmr_source_of(w, v);
     }

@@ -114,10 +114,15 @@ static inline double txm_d3_dist2(txm_dvec3 a, txm_dvec3 b) {
 static inline double txm_d3_dist(txm_dvec3 a, txm_dvec3 b) {
     return sqrt(txm_d3_dist2(a, b));
 }
-/* length 1 in the same direction; the zero vector for the zero vector */
+/* length 1 in the same direction, however long; the zero vector for the zero vector */
 static inline txm_dvec3 txm_d3_unit(txm_dvec3 a) {
     const double n = txm_d3_len(a);
-    return n > 0 ? txm_d3_scale(a, 1 / n) : a;
+    if (n > 1e-150 && n < 1e150) return txm_d3_scale(a, 1 / n);
+    /* its square has too few bits, or is out of range */
+    const double most = fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
+    if (!(most > 0)) return a;
+    a = txm_d3(a.x / most, a.y / most, a.z / most);
+    return txm_d3_scale(a, 1 / txm_d3_len(a));
 }
 /* twice the area of the triangle a b c times its unit normal, on the side from which it is
    counter-clockwise */

@@ -85,7 +85,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->buds = (tpc_bud *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->buds);
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
-        if (p->scratch.failed)
+        if (!tpc_space_make(&g->space, most, &p->scratch))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     }
     return TXM_OK;

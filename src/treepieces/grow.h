@@ -2,6 +2,7 @@
 #define TREEPIECES_GROW_H
 
 #include "kit.h"
+#include "space.h"
 
 /* ---- growing: the state of a tree --------------------------------------------------------- */
 
@@ -9,6 +10,7 @@ enum {
     TPC_BUCKETS = 160,     /* of open rims, by the logarithm of their radius                */
     TPC_GRID = 16,         /* cells along a side of the shade grid                          */
     TPC_CLASSES = 16,      /* of oscillators                                                */
+    TPC_FORK = 2,          /* radii of a stem, up to where it may touch others of its fork  */
     TPC_MAX_BRANCH = 60    /* percent: largest radius of a side branch over that of its stem */
 };
 
@@ -19,11 +21,13 @@ static const float tpc_halving_width = 0.58f; /* of that: narrower tiles are hal
 static const float tpc_twig_radius = 0.033f;  /* the least, in base radii of the trunk          */
 static const float tpc_grid_width = 1.6f;     /* of the shade grid, in trunk lengths            */
 static const float tpc_clearance = 0.04f;     /* above the ground, in trunk lengths             */
+static const float tpc_cell_steps = 1.25f;    /* of the grid of stems, in steps of the trunk    */
 
 /* An open rim. */
 typedef struct tpc_bud {
     int32_t next;                 /* in its bucket                                              */
     int32_t parent;               /* node, or TREEPIECES_NONE                                   */
+    uint64_t seed;                /* of all that is drawn for its piece and those beyond it     */
     uint8_t rim, order, across;   /* across: log2 of the tiles across an edge of the rim        */
     uint8_t is_forked, is_aimed;  /* after a fork, where `start` no longer applies; `aim` is the
                                      direction of the piece after this one                      */
@@ -59,10 +63,19 @@ typedef struct tpc_growth {
     float scale, trunk, foot; /* scale of the place; length and base radius of the trunk, metres  */
     float height;
     uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above       */
+    tpc_space space; /* where the species has a clearance */
 } tpc_growth;
 
 static float tpc_uniform(tpc_growth *g, float low, float high) {
     return low + (high - low) * txm_rng_float(&g->rng);
+}
+
+/* What is drawn at an open rim depends on its seed alone, not on what grew elsewhere before: a tree of
+   fewer pieces is part of one of more. */
+enum { TPC_OPENING = 1, TPC_ATTACHING }; /* streams */
+
+static void tpc_draw_for(tpc_growth *g, uint64_t seed, uint64_t stream) {
+    g->rng = txm_rng_make(seed, stream);
 }
 
 /* ---- growing: open rims by radius ---------------------------------------------------------- */
@@ -180,9 +193,15 @@ static float tpc_thinnest(const tpc_growth *g) {
     return tpc_twig_radius * g->foot;
 }
 
+/* The least length of a piece, in radii, at which its type keeps its proportions. */
+static float tpc_shortest(int type) {
+    static const float low[TREEPIECES_BUILTIN] = {1, 1, 2, 2, 1, 1.2f, 1};
+    return low[type];
+}
+
 /* The length of the next piece, limited to a range of radii so that its type keeps its proportions. */
 static float tpc_choose_length(const tpc_bud *bud, int type) {
-    static const float low[TREEPIECES_BUILTIN] = {1, 1, 2, 2, 1, 1.2f, 1};
+    const float low = tpc_shortest(type);
     static const float high[TREEPIECES_BUILTIN] = {40, 2.5f, 3, 3, 2.5f, 18, 1.4f};
     const float left = (1 - bud->along) * bud->length;
     const float step = bud->rest > 0 ? bud->rest : bud->step;
@@ -190,7 +209,7 @@ static float tpc_choose_length(const tpc_bud *bud, int type) {
     if (type == TREEPIECES_TIP && length < 0.7f * bud->step) length = 0.7f * bud->step;
     /* at most 8 tiles lie along a quad, so one with many across must not be long */
     const float most = txm_minf(high[type], (type == TREEPIECES_I ? 64.0f : 20.0f) / (float)(1 << bud->across));
-    return txm_clampf(length, low[type] * bud->radius, txm_maxf(most, low[type]) * bud->radius);
+    return txm_clampf(length, low * bud->radius, txm_maxf(most, low) * bud->radius);
 }
 
 static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
@@ -447,32 +466,58 @@ static void tpc_add_cluster(tpc_growth *g, int type) {
     c->look = txm_rng_next(&g->rng);
 }
 
+/* How a piece sits on a rim. */
+typedef struct tpc_seat {
+    int turn;
+    float after;                 /* what is left of the bud's roll, degrees */
+    float joint[4], rotation[4]; /* rotation: in the world                  */
+} tpc_seat;
+
+static void tpc_seat_piece(const tpc_bud *bud, const treepieces_choice *c, tpc_seat *seat) {
+    float heading[3] = {c->direction[0], c->direction[1], c->direction[2]}, twist = 0;
+    seat->turn = c->turn;
+    tpc_unit_or_up(heading);
+    if (c->turn < 0) seat->turn = tpc_nearest_sixth(bud->roll, &twist);
+    seat->after = bud->roll - (60 * (float)seat->turn + twist);
+    tpc_joint(bud->rotation, seat->turn, heading, twist, seat->joint);
+    if (seat->turn) tpc_multiply(tpc_turns[seat->turn], seat->joint, seat->joint);
+    tpc_multiply(bud->rotation, seat->joint, seat->rotation);
+}
+
+/* The stem of a piece that sits so. */
+static void tpc_limb_of(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                        const tpc_seat *seat, tpc_limb *stem) {
+    const float up[3] = {0, 1, 0};
+    float direction[3];
+    tpc_rotate(seat->rotation, up, direction);
+    for (int k = 0; k < 3; k++) {
+        stem->from[k] = bud->position[k];
+        stem->to[k] = bud->position[k] + c->length * direction[k];
+    }
+    stem->radius = bud->radius;
+    stem->end = g->kit->pieces[c->type].leaf_count ? bud->radius * c->ratios[0] : 0;
+    stem->parent = bud->parent;
+}
+
 /* Attach the chosen piece to the rim; its leaf rims become open. */
-static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c) {
+static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                       const tpc_seat *seat) {
     const treepieces_piece *p = &g->kit->pieces[c->type];
     treepieces_node *node = &g->nodes[g->node_count];
-    int across[TREEPIECES_MAX_LEAVES] = {0, 0, 0}, turn = c->turn;
-    float heading[3] = {c->direction[0], c->direction[1], c->direction[2]}, twist = 0, rotation[4];
-    float joint[4];
-    float after = bud->roll;
-    tpc_unit_or_up(heading);
-    if (turn < 0) turn = tpc_nearest_sixth(bud->roll, &twist);
-    after -= 60 * (float)turn + twist;
-    tpc_joint(bud->rotation, turn, heading, twist, joint);
-    if (turn) tpc_multiply(tpc_turns[turn], joint, joint);
-    tpc_multiply(bud->rotation, joint, rotation);
+    int across[TREEPIECES_MAX_LEAVES] = {0, 0, 0};
     /* node rotations are relative to the parent, rim frames include the building rotation */
     if (bud->parent >= 0) {
         const int type = g->nodes[bud->parent].type;
-        tpc_multiply_building(g->kit->pieces[type].building[bud->rim].rotation, joint, node->rotation);
+        tpc_multiply_building(g->kit->pieces[type].building[bud->rim].rotation, seat->joint,
+                              node->rotation);
     } else {
-        memcpy(node->rotation, rotation, sizeof rotation);
+        memcpy(node->rotation, seat->rotation, sizeof seat->rotation);
     }
     node->radius = bud->radius;
     node->length = c->length;
     node->parent = bud->parent;
     node->type = (uint8_t)c->type;
-    node->joint = (uint8_t)(bud->rim * 8 + turn);
+    node->joint = (uint8_t)(bud->rim * 8 + seat->turn);
     node->order = bud->order;
     /* the thinner the faster: two classes per octave, plus one at random */
     const int sway = (int)(tpc_float_bits(g->foot) >> 22) - (int)(tpc_float_bits(bud->radius) >> 22) +
@@ -490,11 +535,13 @@ static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choic
     for (int k = 0; k < p->leaf_count; k++) {
         tpc_bud *next = &g->buds[g->bud_count];
         *next = *bud;
-        next->roll = after;
+        next->seed = txm_hash(bud->seed + (uint64_t)(k + 1) * 0x9e3779b97f4a7c15u);
+        next->roll = seat->after;
         next->across = (uint8_t)across[k];
-        tpc_open_rim(g, bud, c, k, rotation, next);
+        tpc_draw_for(g, next->seed, TPC_OPENING);
+        tpc_open_rim(g, bud, c, k, seat->rotation, next);
         if (k == 0 && (c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR))
-            next->roll = after + tpc_order(g, bud->order + 1)->roll; /* of the next branch */
+            next->roll = seat->after + tpc_order(g, bud->order + 1)->roll; /* of the next branch */
         tpc_push(g);
     }
 }
@@ -544,11 +591,12 @@ static void tpc_begin_tree(tpc_growth *g) {
     memset(g->type_counts, 0, sizeof g->type_counts);
     for (int b = 0; b < TPC_BUCKETS; b++) g->first[b] = g->last[b] = -1;
     if (g->species->shade > 0) memset(g->shade, 0, sizeof g->shade);
-    g->rng = txm_rng_make(g->place.seed, 0x7265657069656365u);
+    tpc_draw_for(g, g->place.seed, 0x7265657069656365u);
     g->scale = g->place.scale > 0 ? g->place.scale : 1;
     g->trunk = o->length * g->scale * tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
     g->foot = g->trunk * o->radius;
     bud->parent = TREEPIECES_NONE;
+    bud->seed = g->place.seed;
     memcpy(bud->position, g->place.position, sizeof bud->position);
     double sine, cosine;
     txm_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
@@ -562,27 +610,101 @@ static void tpc_begin_tree(tpc_growth *g) {
     bud->across = 4;
     bud->roll = tpc_uniform(g, 0, 360);
     tpc_push(g);
+    if (g->species->clearance > 0)
+        tpc_space_clear(&g->space, tpc_cell_steps * bud->step + 2 * bud->radius);
+}
+
+/* End the axis here. */
+static void tpc_end_axis(const tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
+    c->type = TREEPIECES_TIP;
+    c->turn = 0;
+    memcpy(c->direction, bud->heading, sizeof c->direction);
+    c->length = tpc_choose_length(bud, TREEPIECES_TIP);
+    c->leaves = g->species->leaf_count > 0 && bud->order > 0;
+}
+
+/* Seat the piece; is another stem in the way? away: out of that. */
+static int tpc_is_in_the_way(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                             tpc_seat *seat, float away[3]) {
+    const float fork = (float)TPC_FORK * bud->radius;
+    tpc_limb limb;
+    tpc_seat_piece(bud, c, seat);
+    if (bud->parent < 0) return 0;
+    tpc_limb_of(g, bud, c, seat, &limb);
+    return tpc_space_touches(&g->space, &limb, g->species->clearance, fork, away);
+}
+
+/* Would a branch of the piece, seated so, begin within another stem? */
+static int tpc_is_branch_blocked(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                                 const tpc_seat *seat) {
+    const treepieces_piece *p = &g->kit->pieces[c->type];
+    float away[3];
+    for (int k = 1; k < p->leaf_count; k++) {
+        const float *to = p->building[k].translation, offset = g->kit->offsets[c->type][k];
+        const float radius = bud->radius * c->ratios[k];
+        float rim[3] = {to[0] * bud->radius, to[1] * c->length, to[2] * bud->radius};
+        float out[3] = {to[0] / offset, 0, to[2] / offset};
+        tpc_limb stub;
+        tpc_rotate(seat->rotation, rim, rim);
+        tpc_rotate(seat->rotation, out, out);
+        for (int i = 0; i < 3; i++) {
+            stub.from[i] = bud->position[i] + rim[i];
+            stub.to[i] = stub.from[i] + tpc_shortest(TREEPIECES_TIP) * radius * out[i];
+        }
+        stub.radius = stub.end = radius;
+        stub.parent = bud->parent;
+        if (tpc_space_touches(&g->space, &stub, g->species->clearance, 0, away)) return 1;
+    }
+    return 0;
+}
+
+/* Seat the piece where it comes too near to no other stem: as chosen, or turned out of the way, or as
+   the end of its axis, the shortest if need be. */
+static void tpc_find_room(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c, tpc_seat *seat) {
+    static const float turns[] = {0.4f, 0.9f, 1.8f}; /* tangents, of further and further aside */
+    enum { TURNS = sizeof turns / sizeof turns[0] };
+    const treepieces_choice chosen = *c;
+    float away[3];
+    for (int t = 0; tpc_is_in_the_way(g, bud, c, seat, away); t++) {
+        if (t == TURNS) {
+            *c = chosen;
+            if (c->type != TREEPIECES_TIP) tpc_end_axis(g, bud, c);
+            c->length = tpc_shortest(TREEPIECES_TIP) * bud->radius;
+            tpc_seat_piece(bud, c, seat);
+            return;
+        }
+        tpc_unit_or_up(away);
+        for (int k = 0; k < 3; k++) c->direction[k] = bud->heading[k] + turns[t] * away[k];
+    }
+    const int has_branch = c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR;
+    if (has_branch && bud->parent >= 0 && tpc_is_branch_blocked(g, bud, c, seat)) c->type = TREEPIECES_I;
 }
 
 /* Grow one tree. Every open rim needs at least one more piece, so near the limit they all get tips. */
 static void tpc_grow(tpc_growth *g) {
     tpc_begin_tree(g);
+    const int is_crowded =
+        g->species->clearance > 0 && g->desc->rule == TREEPIECES_GRAMMAR && !g->desc->own_rule;
     while (g->waiting && g->status == TXM_OK) {
         const tpc_bud *bud = tpc_pop(g);
         treepieces_choice choice;
+        tpc_seat seat;
+        tpc_draw_for(g, bud->seed, TPC_ATTACHING);
         tpc_choose(g, bud, &choice);
         if (g->desc->own_rule && !tpc_call_rule(g, bud, &choice)) return;
         const int leaves = g->kit->pieces[choice.type].leaf_count;
-        if (leaves && g->node_count + 1 + g->waiting + leaves > g->most) {
-            choice.type = TREEPIECES_TIP;
-            choice.turn = 0;
-            choice.length = tpc_choose_length(bud, TREEPIECES_TIP);
-            choice.leaves = g->species->leaf_count > 0 && bud->order > 0;
+        const int is_full = leaves && g->node_count + 1 + g->waiting + leaves > g->most;
+        if (is_full) tpc_end_axis(g, bud, &choice);
+        if (is_crowded) tpc_find_room(g, bud, &choice, &seat);
+        else tpc_seat_piece(bud, &choice, &seat);
+        if (is_crowded) {
+            tpc_limb limb;
+            tpc_limb_of(g, bud, &choice, &seat, &limb);
+            tpc_space_add(&g->space, &limb);
         }
-        const int pruned = leaves && choice.type == TREEPIECES_TIP && choice.leaves;
         const float left = (1 - bud->along) * bud->length;
-        tpc_attach(g, bud, &choice);
-        if (pruned) /* its cloud represents the whole pruned branch */
+        tpc_attach(g, bud, &choice, &seat);
+        if (is_full && choice.leaves) /* its cloud represents the whole pruned branch */
             g->clusters[g->cluster_count - 1].radius *=
                 txm_clampf(0.35f * left / (g->species->cloud * g->scale), 1, 1.8f);
     }

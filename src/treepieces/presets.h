@@ -9,6 +9,7 @@
 static const char tpc_fresh[] =
     "flare 1.6\n"
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
+    "clearance 1.2\n"
     "stiffness 1\n"
     "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud 0.5\n" "cloud_flat 0.8\n"
     "leaf_color 0.3 0.45 0.15\n" "bark_color 0.4 0.35 0.3\n"

@@ -5,11 +5,14 @@
 
 /* ---- the right number --------------------------------------------------------------------- */
 
+/* costs above this rank alike: keys, which have three decimals, have 32 bits */
+enum { TMR_MOST_COST = 4000000 };
+
 /* how collapsing (sign -1) or splitting (+1) the edge of c would change the cost of valences */
-static int tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
+static int64_t tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
-    int cost = 0;
+    int64_t cost = 0;
     if (!tmr_is_ghost(m, d)) cost += tmr_valence_cost(m, d, sign) - tmr_valence_cost(m, d, 0);
     if (!tmr_is_ghost(m, e)) cost += tmr_valence_cost(m, e, sign) - tmr_valence_cost(m, e, 0);
     if (sign > 0) return cost + 4;
@@ -58,7 +61,9 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
             const double size = tmr_edge_size(w, c);
             if (sign > 0 && size < 0.6 && pass < 30) continue;
             TRIMESH_ASSERT(count < most);
-            pairs[count].key = (uint32_t)(1000 * (100 + tmr_count_cost(m, c, sign)) -
+            const int64_t full = tmr_count_cost(m, c, sign);
+            const int64_t cost = full < TMR_MOST_COST ? full : TMR_MOST_COST;
+            pairs[count].key = (uint32_t)(1000 * (100 + cost) -
                                           sign * (int)(300 * fmin(size, 3)) +
                                           (m->edge[c] ? 2000 : 0));
             pairs[count++].value = (uint32_t)c;

@@ -19,14 +19,15 @@ static double tmr_quality(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 n) {
 static int tmr_ideal_valence(const tmr_mesh *m, int32_t v) {
     return tmr_kind_of(m, v) == TRIMESH_BORDER ? 5 : 6;
 }
-static int tmr_valence_cost(const tmr_mesh *m, int32_t v, int change) {
+/* what it costs to have others: their square, of up to millions */
+static int64_t tmr_valence_cost(const tmr_mesh *m, int32_t v, int change) {
     if (tmr_kind_of(m, v) == TRIMESH_CORNER) return 0;
-    const int d = m->valence[v] + change - tmr_ideal_valence(m, v);
+    const int64_t d = (int64_t)m->valence[v] + change - tmr_ideal_valence(m, v);
     return d * d;
 }
 
 /* by how much flipping the edge opposite to c would lower the cost of valences */
-static int tmr_flip_gain(const tmr_mesh *m, int32_t c) {
+static int64_t tmr_flip_gain(const tmr_mesh *m, int32_t c) {
     const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
     const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
     return tmr_valence_cost(m, a, 0) + tmr_valence_cost(m, b, 0) + tmr_valence_cost(m, d, 0) +

@@ -136,6 +136,13 @@ static txm_mesh_place tmr_source_of(const tmr_work *w, int32_t v) {
     return tmr_surface_source(s, w->desc, &at);
 }
 
+/* The normal at vertex v: where those around cancel out, as on a sheet folded onto itself, that of the
+   face in which it lies. */
+static txm_dvec3 tmr_normal_of(const tmr_work *w, int32_t v) {
+    const txm_dvec3 n = w->m.n[v];
+    return n.x != 0 || n.y != 0 || n.z != 0 ? n : w->s->normal[tmr_face_of(w, v)];
+}
+
 /* Make the result, in the caller's units. */
 static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
     const tmr_mesh *m = &w->m;
@@ -166,13 +173,14 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         TRIMESH_ASSERT(mesh->vertex_count < (size_t)m->live);
         const size_t k = mesh->vertex_count++;
         const txm_dvec3 p = txm_d3_add(txm_d3_scale(m->p[v], s->diagonal), s->centre);
+        const txm_dvec3 normal = tmr_normal_of(w, v);
         number[v] = (int32_t)k;
         mesh->positions[3 * k] = txm_float(p.x);
         mesh->positions[3 * k + 1] = txm_float(p.y);
         mesh->positions[3 * k + 2] = txm_float(p.z);
-        mesh->normals[3 * k] = txm_float(m->n[v].x);
-        mesh->normals[3 * k + 1] = txm_float(m->n[v].y);
-        mesh->normals[3 * k + 2] = txm_float(m->n[v].z);
+        mesh->normals[3 * k] = txm_float(normal.x);
+        mesh->normals[3 * k + 1] = txm_float(normal.y);
+        mesh->normals[3 * k + 2] = txm_float(normal.z);
         mesh->kinds[k] = (uint8_t)tmr_kind_of(m, v);
         mesh->sources[k] = tmr_source_of(w, v);
     }

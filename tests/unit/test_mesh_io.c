@@ -57,10 +57,13 @@ static void obj_colors(void **state) {
 static void polygons_become_triangles(void **state) {
     (void)state;
     mesh_data m;
-    /* convex: a fan */
-    static const uint32_t fan[] = {0, 1, 2, 0, 2, 3, 0, 3, 4};
-    read_text("v 0 0 0\nv 2 0 0\nv 3 2 0\nv 1 3 0\nv -1 2 0\nf 1 2 3 4 5\n", &m);
-    assert_indices(&m, fan, 3);
+    /* a square, cut from its first corner; one that is hollow beside it is not */
+    static const uint32_t square[] = {0, 1, 2, 0, 2, 3}, hollow[] = {0, 1, 3, 1, 2, 3};
+    read_text("v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n", &m);
+    assert_indices(&m, square, 2);
+    mesh_free(&m);
+    read_text("v 0 0 0\nv 1 2 0\nv 2 0 0\nv 1 3 0\nf 1 2 3 4\n", &m);
+    assert_indices(&m, hollow, 2);
     mesh_free(&m);
     /* an L that a fan from its first corner would leave */
     read_text("v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\n", &m);
@@ -159,7 +162,7 @@ static void text_as_people_have_it(void **state) {
         "v 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2 3\n",
         "\xef\xbb\xbfv 0 0 0\nv 1.5 0 0\nv 0 25 0\nf 1 2 3\n",
         "# a\rv 0 0 0\rv 1.5 0 0\rv 0 25 0\rf 1 2 3\r",
-        "v 0 0 0\r\nv 1.5 \\\r\n0 0\r\nv 0 25 0\r\nf 1 2\\  \r\n 3",
+        "v 0 0 0\r\nv 1.5 \\\r\n0 0\r\nv 0 25 0\r\nf 1 2\\  \r\n 3 \\",
         "# C:\\\nv 0 0 0\no a\\\nv 1.5 0 0 # \\\nv 0 25 0\nusemtl \\\nf 1 2 3 # \\\nfoo\\\n",
         "mtllib b\\\rv 0 0 0\rg\\\rv 1.5 0 0\rv 0 25 0\rf 1 2 3",
         "v 0 0D0 0.\nv 1.5D+00 0 0.d0\nv 0 2.5d1 0\nf 1 2 3\n",

@@ -63,6 +63,10 @@ static void test_double_vectors(void **state) {
     }
     const txm_dvec3 zero = txm_d3_unit(txm_d3(0, 0, 0));
     assert_true(zero.x == 0 && zero.y == 0 && zero.z == 0);
+    for (double size = 1e-320; size < 1e308; size *= 1e4) { /* also where its square is 0 or infinite */
+        const txm_dvec3 unit = txm_d3_unit(txm_d3(size, -size, 0));
+        assert_near(txm_d3_dist(unit, txm_d3(sqrt(0.5), -sqrt(0.5), 0)), 0, 1e-15);
+    }
     const txm_dvec3 up = txm_d3_area2(txm_d3(0, 0, 0), txm_d3(2, 0, 0), txm_d3(0, 3, 0));
     assert_true(up.x == 0 && up.y == 0 && up.z == 6);
 }

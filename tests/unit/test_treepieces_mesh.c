@@ -615,7 +615,7 @@ static void test_refusals(void **state) {
         assert_int_equal(tk_leaks(&memory), 0);
         free_grown(&g);
     }
-    grown g = grow_preset(0, 12000, 0, 2);
+    grown g = grow_preset(3, 12000, 0, 2);
     const treepieces_lod fine = {{0, 0, 0}, 64, 1e30f, 0};
     tk_memory memory;
     treepieces_bake_desc d = describe_bake(&g);

@@ -168,6 +168,22 @@ static void test_blades(void **state) {
     assert_true(atol(env.message + strlen(too_few)) > 1000);
 }
 
+/* Two triangles folded onto each other: along the fold their normals cancel out, but a result has unit
+   normals everywhere. */
+static void test_fold(void **state) {
+    (void)state;
+    in.vertices = in.triangles = 0;
+    const uint32_t a = vertex(0, 0, 0), b = vertex(1, 0, 0);
+    triangle(a, b, vertex(0.3, 1, 0));
+    triangle(b, a, vertex(0.7, 1, 0));
+    const trimesh_desc d = describe(60, TRIMESH_LATTICE);
+    trimesh_mesh *mesh = NULL;
+    assert_int_equal(trimesh_retile(&d, NULL, &mesh), TXM_OK);
+    for (size_t v = 0; v < mesh->vertex_count; v++)
+        assert_true(fabs(txm_d3_len(txm_d3_load(mesh->normals + 3 * v)) - 1) < 1e-6);
+    trimesh_mesh_free(mesh);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_crosses),
@@ -175,6 +191,7 @@ int main(void) {
         cmocka_unit_test(test_confetti),
         cmocka_unit_test(test_handles),
         cmocka_unit_test(test_blades),
+        cmocka_unit_test(test_fold),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "trimesh_relax/mend_all.h"
+#include "trimesh_relax/relax.h"
 #include "surfaces.h"
 #include "testkit.h"
 
@@ -51,6 +52,21 @@ static void turn(size_t t) {
     const uint32_t b = in.t[3 * t + 1];
     in.t[3 * t + 1] = in.t[3 * t + 2];
     in.t[3 * t + 2] = b;
+}
+
+/* ---- numbers without end ---- */
+
+/* Needles are cut into so many pieces that the square of a valence takes more than 32 bits. */
+static void test_valence(void **state) {
+    int32_t valence[1] = {500000};
+    uint8_t flags[1] = {TRIMESH_FREE};
+    tmr_mesh m;
+    (void)state;
+    memset(&m, 0, sizeof m);
+    m.valence = valence;
+    m.flags = flags;
+    assert_true(tmr_valence_cost(&m, 0, 0) == INT64_C(499994) * 499994);
+    assert_true(tmr_valence_cost(&m, 0, 1) == INT64_C(499995) * 499995);
 }
 
 /* ---- building and checking ---- */
@@ -627,6 +643,7 @@ static void test_memory(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_clean),       cmocka_unit_test(test_units),
+        cmocka_unit_test(test_valence),
         cmocka_unit_test(test_measures),    cmocka_unit_test(test_weld),
         cmocka_unit_test(test_winding),     cmocka_unit_test(test_duplicates),
         cmocka_unit_test(test_pinch),       cmocka_unit_test(test_fins),

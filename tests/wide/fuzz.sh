@@ -1,7 +1,7 @@
 #!/bin/sh
-# Loaders of models and composites against hostile bytes, and public calls against pictures, masks and
-# options of all kinds: for each program as many runs as take some 20 s here, ten times as many with
-# FULL=1, from seed SEED. tests/wide/fuzz/fuzzkit.h tells more.
+# Loaders of models and composites against hostile bytes, and public calls against pictures, masks,
+# meshes and options of all kinds: for each program as many runs as take some 20 s here, ten times as
+# many with FULL=1, from seed SEED. tests/wide/fuzz/fuzzkit.h tells more.
 . tests/kit/tap.sh
 
 mkdir "$tmp/seeds"
@@ -19,6 +19,7 @@ build/texkit composite "$tmp/parts.png" --labels "$tmp/parts-labels.png" -o "$tm
 fuzz() {
     name=$1 module=${1%%_*} runs=$2
     shift 2
+    case $name in trimesh_*) module=$name ;; esac
     [ "$FULL" = 1 ] && runs=${runs}0
     with="$OUT/modules/$module.o -D$(echo "$module" | tr '[:lower:]' '[:upper:]')_IMPLEMENTED"
     case $name in texsyn_load | texmath) with= ;; esac
@@ -28,16 +29,18 @@ fuzz() {
         check "$runs runs of fuzz_$name" "$OUT/fuzz_$name" $runs "$@"
 }
 fuzz texsyn_load 20000 "$tmp"/seeds/*
-fuzz texsyn_weather 150
-fuzz texsyn_fill 150
-fuzz texsyn_knit 150
-fuzz texsyn_segment 60
+fuzz texsyn_weather 150 "${SEED:-1}"
+fuzz texsyn_fill 150 "${SEED:-1}"
+fuzz texsyn_knit 150 "${SEED:-1}"
+fuzz texsyn_segment 60 "${SEED:-1}"
 fuzz texsyn_learn 100 "${SEED:-1}"
 fuzz texpatch 250 "${SEED:-1}"
 fuzz texedges 10000 "${SEED:-1}"
 fuzz textiles 600 "${SEED:-1}"
 fuzz texmath 20000 "${SEED:-1}"
-fuzz texinpaint 100
+fuzz texinpaint 100 "${SEED:-1}"
+fuzz trimesh_relax 250 "${SEED:-1}"
+fuzz trimesh_cover 1000 "${SEED:-1}"
 
 # libFuzzer follows what the loader does with its bytes
 if [ "$FULL" = 1 ] && has clang; then

@@ -42,11 +42,10 @@ static int is_gltf_text(const text *in) {
 static int read_format(builder *b, const unsigned char *bytes, size_t size, int points_too) {
     text in = text_of(bytes, size);
     int ok;
-    if (size >= 4 && !memcmp(bytes, "glTF", 4))
-        return mesh_read_glb(b, bytes, size);
+    if (size >= 4 && !memcmp(bytes, "glTF", 4)) return mesh_read_glb(b, bytes, size);
+    if (stl_has_size(bytes, size)) return mesh_read_stl_binary(b, bytes, size);
     if (is_wide_text(bytes, size))
         return builder_fail(b, 0, "its text is in UTF-16; save it in UTF-8");
-    if (stl_has_size(bytes, size)) return mesh_read_stl_binary(b, bytes, size);
     if (is_gltf_text(&in))
         return builder_fail(b, 0, "a .gltf has its triangles in other files; save it as .glb");
     if (starts_with(&in, "ply")) ok = mesh_read_ply(b, &in, points_too);

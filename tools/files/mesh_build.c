@@ -19,8 +19,6 @@ void builder_init(builder *b, mesh_data *mesh, const char **why) {
     b->corners = list_of(sizeof(corner));
     b->polygons = list_of(sizeof(polygon));
     b->triangles = list_of(3 * sizeof(corner));
-    b->flat = list_of(2 * sizeof(double));
-    b->around = list_of(sizeof(size_t));
     b->bad = list_of(sizeof(bad_position));
     b->names = b->library = list_of(1);
     b->vertex_shades = b->face_shades = list_of(sizeof(shade));
@@ -40,8 +38,10 @@ void builder_free(builder *b) {
     list_free(&b->corners);
     list_free(&b->polygons);
     list_free(&b->triangles);
-    list_free(&b->flat);
-    list_free(&b->around);
+    list_free(&b->bends);
+    list_free(&b->heap);
+    list_free(&b->sorted);
+    list_free(&b->boxes);
     list_free(&b->bad);
     list_free(&b->names);
     list_free(&b->library);

@@ -72,7 +72,7 @@ typedef struct builder {
     list normals, rotations, colors, uvs; /* 3, 4 floats, 4 bytes, 2 floats; uvs likewise */
     list corners, polygons;                          /* as they stand in the file         */
     list triangles;                                  /* 3 corners each                    */
-    list flat, around;                               /* scratch of triangulate            */
+    list bends, heap, sorted, boxes;                 /* scratch of mesh_polygon.c, which sets their sizes */
     list names, library;      /* of materials, as in mesh_data                            */
     list vertex_shades;       /* 1 shade per vertex, or none                              */
     list face_shades;         /* 1 shade per polygon, or none                             */
@@ -151,8 +151,9 @@ int builder_finish(builder *b);
 
 /* ---- polygons to triangles: mesh_polygon.c ----------------------------------------------- */
 
-/* Add the triangles of a polygon. Convex ones become fans; from others ears are cut off while there
-   are any. */
+/* Add the triangles of a polygon, two less than it has corners, which are 3 or more: right for any
+   that does not cross itself, whatever its shape, also with corners in a line, with holes that a
+   doubled edge joins on, and not flat. O(n log n) steps. 0: no memory. */
 int polygon_triangulate(builder *b, const corner *p, size_t n);
 
 /* ---- text: mesh_text.c ------------------------------------------------------------------- */

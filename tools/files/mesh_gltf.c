@@ -30,12 +30,27 @@ typedef struct items {
     size_t count;
 } items;
 
+/* What an accessor refers to; stride 0: not yet known. */
+typedef struct accessor {
+    const unsigned char *bytes; /* of the first element */
+    size_t count, stride;
+    int component, width, is_normalized;
+} accessor;
+
+/* A piece of the binary chunk; is_known: 0 not yet. */
+typedef struct view {
+    size_t start, length, stride; /* stride 0: as large as an element */
+    int is_known;
+} view;
+
 typedef struct gltf {
     builder *b;
     cJSON *json;
     const unsigned char *binary;
     size_t binary_size, room; /* room: for corners and vertices, see MOST_COPIES */
     items accessors, views, meshes, nodes, materials;
+    accessor *read_accessors; /* each is read once, as many primitives may refer to it */
+    view *read_views;
     unsigned char *seen;      /* per node */
     list stack;               /* of pending */
 } gltf;
@@ -44,13 +59,6 @@ typedef struct pending {
     size_t node;
     matrix map;
 } pending;
-
-/* What an accessor refers to. */
-typedef struct accessor {
-    const unsigned char *bytes; /* of the first element */
-    size_t count, stride;
-    int component, width, is_normalized;
-} accessor;
 
 static size_t least_of(size_t a, size_t b) {
     return a < b ? a : b;
@@ -164,10 +172,29 @@ static int width_of(const cJSON *type) {
     return 0;
 }
 
-static int read_accessor(const gltf *g, size_t index, accessor *a) {
-    const cJSON *json = g->accessors.of[index].json, *view;
-    size_t component = 0, start = 0, view_index = 0, view_start = 0, length = 0, buffer = 0;
-    memset(a, 0, sizeof *a);
+/* The view of this number, or NULL if it is damaged. */
+static const view *read_view(const gltf *g, size_t index) {
+    const cJSON *json = g->views.of[index].json;
+    view *v = &g->read_views[index];
+    size_t buffer = 0;
+    if (v->is_known) return v;
+    if (!get_size(json, "buffer", 0, &buffer) || /* the one in this file */
+        !get_size(json, "byteOffset", g->binary_size, &v->start) || !member(json, "byteLength") ||
+        !get_size(json, "byteLength", g->binary_size - v->start, &v->length) ||
+        !get_size(json, "byteStride", MOST_STRIDE, &v->stride))
+        return NULL;
+    v->is_known = 1;
+    return v;
+}
+
+static int read_accessor(const gltf *g, size_t index, accessor *to) {
+    const cJSON *json = g->accessors.of[index].json;
+    accessor *a = &g->read_accessors[index];
+    size_t component = 0, start = 0, view_index = 0;
+    if (a->stride) {
+        *to = *a;
+        return 1;
+    }
     if (member(json, "sparse"))
         return builder_fail(g->b, 0, "accessor %lu is sparse, which is not read",
                             (unsigned long)index);
@@ -179,21 +206,15 @@ static int read_accessor(const gltf *g, size_t index, accessor *a) {
     a->width = width_of(member(json, "type"));
     a->is_normalized = cJSON_IsTrue(member(json, "normalized"));
     const size_t element = component_size(a->component) * (size_t)a->width;
-    ok = ok && element;
-    if (ok) {
-        view = g->views.of[view_index].json;
-        a->stride = element;
-        ok = get_size(view, "buffer", 0, &buffer) && /* the one in this file */
-             get_size(view, "byteOffset", g->binary_size, &view_start) &&
-             member(view, "byteLength") &&
-             get_size(view, "byteLength", g->binary_size - view_start, &length) &&
-             get_size(view, "byteStride", MOST_STRIDE, &a->stride) && a->stride >= element &&
-             start <= length && element <= length - start &&
-             a->count - 1 <= (length - start - element) / a->stride;
-    }
+    const view *v = ok && element ? read_view(g, view_index) : NULL;
+    const size_t stride = v && v->stride ? v->stride : element;
+    ok = v && stride >= element && start <= v->length && element <= v->length - start &&
+         a->count - 1 <= (v->length - start - element) / stride;
     if (!ok) return builder_fail(g->b, 0, "accessor %lu is out of range or damaged",
                                  (unsigned long)index);
-    a->bytes = g->binary + view_start + start;
+    a->bytes = g->binary + v->start + start;
+    a->stride = stride;
+    *to = *a;
     return 1;
 }
 
@@ -593,7 +614,9 @@ static int read_node(gltf *g, const pending *p) {
 
 static int read_scene(gltf *g) {
     g->seen = (unsigned char *)calloc(g->nodes.count + 1, 1);
-    if (!g->seen) return builder_fail_memory(g->b);
+    g->read_accessors = (accessor *)calloc(g->accessors.count + 1, sizeof(accessor));
+    g->read_views = (view *)calloc(g->views.count + 1, sizeof(view));
+    if (!g->seen || !g->read_accessors || !g->read_views) return builder_fail_memory(g->b);
     int ok = push_roots(g);
     while (ok && g->stack.count) {
         const pending p = ((const pending *)g->stack.items)[--g->stack.count];
@@ -626,6 +649,8 @@ int mesh_read_glb(builder *b, const unsigned char *bytes, size_t size) {
     free(g.nodes.of);
     free(g.materials.of);
     free(g.seen);
+    free(g.read_accessors);
+    free(g.read_views);
     list_free(&g.stack);
     return ok;
 }

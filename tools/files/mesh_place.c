@@ -3,8 +3,8 @@
 #include "mesh_file.h"
 
 /* How many times a mesh's extent may lie away from zero before an origin is taken off: floats then
-   still hold 2^-18 of it. */
-static const double MOST_OFFSET = 64;
+   still hold 2^-20 of it. */
+static const double MOST_OFFSET = 16;
 
 /* Extents in which floats compute well: areas and volumes are products of up to four of them. */
 enum { LEAST_EXPONENT = -24, MOST_EXPONENT = 24 };

@@ -360,7 +360,7 @@ static int read_ply_index(const builder *b, const ply *h, const ply_property *p,
     double value;
     if (!read_scalar(h, in, p->type, &value)) return fail_body(b, h, in);
     *index = NO_VERTEX;
-    if (is_strip && value == -1) return 1;
+    if (is_strip && (value == -1 || value == 4294967295.0)) return 1; /* -1 without a sign */
     if (!(value >= 0 && value < 2147483648.0) || value != floor(value))
         return builder_fail(b, h->format == PLY_ASCII ? in->line : 0,
                             "a face with an index that is out of range");

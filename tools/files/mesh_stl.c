@@ -22,7 +22,7 @@ int stl_has_size(const unsigned char *bytes, size_t size) {
 }
 
 int stl_may_be(const unsigned char *bytes, size_t size) {
-    return size >= DATA_START && memchr(bytes, 0, size) != NULL;
+    return size >= DATA_START && memchr(bytes, 0, DATA_START) != NULL;
 }
 
 /* ---- equal vertices ---------------------------------------------------------------------- */

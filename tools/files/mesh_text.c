@@ -20,7 +20,7 @@ void text_skip_blanks(text *in) {
         } else if (*in->at == '\\' && in->joins) {
             const char *p = in->at + 1;
             while (p < in->end && is_blank(*p)) p++;
-            if (p == in->end || !is_line_end(*p)) return;
+            if (p < in->end && !is_line_end(*p)) return;
             in->at = p;
             text_end_line(in);
         } else {

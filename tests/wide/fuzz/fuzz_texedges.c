@@ -5,9 +5,10 @@
 #define TEXEDGES_IMPLEMENTATION
 #include "texedges.h"
 
+#define FUZZ_BYTES 240
 #include "fuzzkit.h"
 
-enum { USED = 240, MOST_SIDE = 90, MOST_STROKES = 4, MOST_POINTS = 12 };
+enum { MOST_SIDE = 90, MOST_STROKES = 4, MOST_POINTS = 12 };
 
 typedef struct input {
     texedges_desc desc;
@@ -93,7 +94,7 @@ static void use_strokes(input *in, pool *p, source *s) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static input in;
     static pool p;
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     texedges_set *set = NULL;
     trouble t;
     make_desc(&in, &p, &s);
@@ -118,9 +119,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     drain(&p);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    return fuzz_main(argc, argv, USED);
-}
-#endif

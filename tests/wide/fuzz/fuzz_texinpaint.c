@@ -1,9 +1,5 @@
 /* fuzz_texinpaint.c - hostile pictures, masks, meshes and descriptions into texinpaint.h
-   SPDX-License-Identifier: MIT OR Unlicense
-
-   With clang: -fsanitize=fuzzer,address,undefined.
-   With any compiler: -DFUZZ_STANDALONE; the program then draws its inputs itself:
-   fuzz_texinpaint RUNS [FIRST]
+   SPDX-License-Identifier: MIT OR Unlicense; fuzzkit.h says how to run it
 
    Bytes say what to make, and a generator seeded with them fills pictures and meshes. Whatever comes
    back must be as texinpaint.h promises: known texels unchanged, outputs untouched after an error,
@@ -13,34 +9,11 @@
 
 #include "faults.h"
 
-#include <stdio.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
-
-static long accepted; /* completions so far */
+#define FUZZ_BYTES 8
+#include "fuzzkit.h"
 
 enum { MOST_SIDE = 56, MOST_PIXELS = MOST_SIDE * MOST_SIDE, MOST_MAPS = 3, MOST_VERTICES = 200,
-       MOST_FACES = 300, FILL = 0x5c };
-
-/* what to make is read from here */
-typedef struct source {
-    const uint8_t *data;
-    size_t left;
-    txm_rng rng;
-} source;
-
-/* one of n possibilities */
-static int pick(source *s, int n) {
-    if (s->left) {
-        s->left--;
-        return *s->data++ % n;
-    }
-    return (int)txm_rng_below(&s->rng, (uint32_t)n);
-}
-
-static float unit(source *s) {
-    return txm_rng_float(&s->rng);
-}
+       MOST_FACES = 300 };
 
 typedef struct input {
     texinpaint_desc desc;
@@ -89,7 +62,7 @@ static txm_image draw_picture(source *s, void *pixels, int width, int height) {
     return im;
 }
 
-static txm_image draw_mask(source *s, uint8_t *pixels, int width, int height) {
+static txm_image draw_hole(source *s, uint8_t *pixels, int width, int height) {
     const int kind = pick(s, 9), channels = pick(s, 8) ? 1 : 1 + pick(s, 4);
     const int cx = pick(s, width), cy = pick(s, height), r = 1 + pick(s, 20), every = 1 + pick(s, 60);
     txm_image im;
@@ -219,8 +192,8 @@ static void draw_desc(source *s) {
     memset(&in, 0, sizeof in);
     const int width = 1 + pick(s, pick(s, 3) ? MOST_SIDE : 12), height = 1 + pick(s, MOST_SIDE);
     d->image = draw_picture(s, in.pixels[0], width, height);
-    d->mask = draw_mask(s, in.mask, width, height);
-    if (pick(s, 5) == 0) d->source = draw_mask(s, in.source, width, height);
+    d->mask = draw_hole(s, in.mask, width, height);
+    if (pick(s, 5) == 0) d->source = draw_hole(s, in.source, width, height);
     d->map_count = pick(s, 3) ? 0 : 1 + pick(s, MOST_MAPS);
     for (int i = 0; i < d->map_count; i++) {
         in.maps[i].image = draw_picture(s, in.pixels[i + 1], width, height);
@@ -258,7 +231,7 @@ static void outputs(int which, txm_image to[MOST_MAPS + 1]) {
         to[m] = *map_of(m);
         to[m].pixels = out[which][m];
     }
-    memset(out[which], FILL, sizeof out[which]);
+    memset(out[which], FRESH, sizeof out[which]);
 }
 
 static void check_outputs(int which, int is_ok) {
@@ -269,7 +242,7 @@ static void check_outputs(int which, int is_ok) {
         const size_t pixel = (size_t)im->channels * txm_sample_bytes(im->sample);
         const uint8_t *to = (const uint8_t *)out[which][m], *from = (const uint8_t *)in.pixels[m];
         for (size_t i = 0; i < bytes_of(im) && !is_ok; i++) {
-            if (to[i] != FILL) abort();
+            if (to[i] != FRESH) abort();
         }
         if (!is_ok) continue;
         for (int i = 0; i < im->width * im->height; i++) {
@@ -338,14 +311,9 @@ static void check_steps(source *s, const txm_image *to) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    source s;
+    source s = source_of(data, size);
     txm_image to[MOST_MAPS + 1];
-    uint64_t hash = 0;
     static txm_env env;
-    for (size_t i = 0; i < size; i++) hash = txm_hash(hash + data[i]);
-    s.data = data;
-    s.left = size;
-    s.rng = txm_rng_make(hash, 1);
     draw_desc(&s);
     in.desc.show_user = &env;
     memset(&env, 0, sizeof env);
@@ -357,7 +325,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
                                    : texinpaint_complete(&in.desc, &env, to);
     check_status(status, &env);
     if (way != 1 || status != TXM_OK) check_outputs(0, status == TXM_OK);
-    if (status == TXM_OK) accepted++;
+    if (status == TXM_OK) fuzz_succeeded++;
     if (status != TXM_OK || way < 2 || way > 4) return 0;
     outputs(1, to);
     check_steps(&s, to);
@@ -366,25 +334,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    const long runs = argc > 1 ? atol(argv[1]) : 0, first = argc > 2 ? atol(argv[2]) : 0;
-    if (runs < 1) {
-        fprintf(stderr, "usage: fuzz_texinpaint RUNS [FIRST]\n");
-        return 2;
-    }
-    for (long i = first; i < first + runs; i++) {
-        uint8_t data[8];
-        const char *verbose = getenv("VERBOSE");
-        for (int k = 0; k < 8; k++) data[k] = (uint8_t)(txm_hash((uint64_t)i + 1) >> 8 * k);
-        if (verbose) {
-            printf("%ld\n", i);
-            fflush(stdout);
-        }
-        LLVMFuzzerTestOneInput(data, sizeof data);
-    }
-    printf("%ld runs, %ld accepted\n", runs, accepted);
-    return accepted > runs / 10 ? 0 : 1; /* else the inputs are too hostile to try anything */
-}
-#endif

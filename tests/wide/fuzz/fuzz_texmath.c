@@ -5,9 +5,10 @@
    matter, and what is known stays as it is.                                                       */
 #include "texmath.h"
 
+#define FUZZ_BYTES 160
 #include "fuzzkit.h"
 
-enum { USED = 160, MOST_SIDE = 40 };
+enum { MOST_SIDE = 40 };
 
 /* Views with fields of any value: a check must say what is wrong without a look at the pixels. */
 static void view(source *s) {
@@ -157,7 +158,7 @@ static void cut(pool *p, source *s) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static pool p;
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     switch (pick(&s, 6)) {
     case 0: view(&s); break;
     case 1: halve(&p, &s); break;
@@ -169,9 +170,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     drain(&p);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    return fuzz_main(argc, argv, USED);
-}
-#endif

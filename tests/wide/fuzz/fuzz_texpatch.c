@@ -6,9 +6,10 @@
 #define TEXPATCH_IMPLEMENTATION
 #include "texpatch.h"
 
+#define FUZZ_BYTES 300
 #include "fuzzkit.h"
 
-enum { USED = 300, MOST_MAPS = 3, MOST_WINDOW = 90 };
+enum { MOST_MAPS = 3, MOST_WINDOW = 90 };
 
 typedef struct input {
     texpatch_desc desc;
@@ -200,7 +201,7 @@ static void halved(pool *p, source *s) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static input in;
     static pool p;
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     const int way = pick(&s, 8);
     if (way == 0) {
         halved(&p, &s);
@@ -213,9 +214,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     drain(&p);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    return fuzz_main(argc, argv, USED);
-}
-#endif

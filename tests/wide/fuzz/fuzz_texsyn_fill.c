@@ -1,21 +1,15 @@
 /* fuzz_texsyn_fill.c - random pictures, masks and descriptions into texsyn_fill
-   SPDX-License-Identifier: MIT OR Unlicense
-
-   With clang: -fsanitize=fuzzer,address,undefined. With any compiler: -DFUZZ_STANDALONE; the program
-   then makes the bytes itself: fuzz_texsyn_fill RUNS
+   SPDX-License-Identifier: MIT OR Unlicense; fuzzkit.h says how to run it
 
    The bytes choose size, channels, depth, strides, kind of mask and source, quality, and which
    allocation fails. Known pixels must come out as they went in, and nothing after an error.     */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
+#define FUZZ_BYTES 16
 #include "fuzzkit.h"
 
-enum { MOST_SIDE = 80, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = 16 };
-
-static long filled; /* calls that succeeded */
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+enum { MOST_SIDE = 80, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = FUZZ_BYTES };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static uint8_t image[MOST_BYTES], mask[MOST_BYTES], source[MOST_BYTES], out[MOST_BYTES],
@@ -56,7 +50,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         if (!env.message[0] || memcmp(out, before, sizeof out) != 0) abort();
         return 0;
     }
-    filled++;
+    fuzz_succeeded++;
     static uint8_t counts[MOST_SIDE * MOST_SIDE];
     const size_t pixel = (size_t)channels * txm_sample_bytes(sample);
     txm_mask_read(&desc.mask, TXM_MASK_REPLACES, counts);
@@ -70,21 +64,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    const long runs = argc > 1 ? atol(argv[1]) : 0;
-    txm_rng rng = txm_rng_make(1, 0);
-    uint8_t data[USED];
-    if (runs < 1) {
-        fprintf(stderr, "usage: fuzz_texsyn_fill RUNS\n");
-        return 2;
-    }
-    for (long i = 0; i < runs; i++) {
-        for (int k = 0; k < USED; k++) data[k] = (uint8_t)txm_rng_next(&rng);
-        LLVMFuzzerTestOneInput(data, sizeof data);
-    }
-    printf("%ld runs, %ld filled\n", runs, filled);
-    return filled > runs / 10 ? 0 : 1;
-}
-#endif

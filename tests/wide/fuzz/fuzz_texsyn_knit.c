@@ -1,21 +1,15 @@
 /* fuzz_texsyn_knit.c - random pictures, layouts and descriptions into texsyn_knit
-   SPDX-License-Identifier: MIT OR Unlicense
-
-   With clang: -fsanitize=fuzzer,address,undefined. With any compiler: -DFUZZ_STANDALONE; the program
-   then makes the bytes itself: fuzz_texsyn_knit RUNS
+   SPDX-License-Identifier: MIT OR Unlicense; fuzzkit.h says how to run it
 
    The bytes choose sizes, channels, depth, strides, kind of layout, zone, roughness, example of a border
    and which allocation fails. Nothing may be written after an error, nor between the rows.       */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
+#define FUZZ_BYTES 24
 #include "fuzzkit.h"
 
-enum { MOST_SIDE = 72, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = 24 };
-
-static long knitted; /* calls that succeeded */
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+enum { MOST_SIDE = 72, MOST_BYTES = MOST_SIDE * (MOST_SIDE * 16 + 32), USED = FUZZ_BYTES };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static uint8_t a[MOST_BYTES], b[MOST_BYTES], layout[MOST_BYTES], border[MOST_BYTES],
@@ -62,27 +56,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const txm_status status = texsyn_knit(&desc, &env, result);
     if (m.blocks) abort();
     if (status != TXM_OK && (!env.message[0] || memcmp(out, before, sizeof out) != 0)) abort();
-    knitted += status == TXM_OK;
+    fuzz_succeeded += status == TXM_OK;
     const size_t row = (size_t)width * (size_t)channels * txm_sample_bytes(sample);
     for (int y = 0; y < height; y++) memset(txm_image_row(&result, y), 0x5c, row);
     if (memcmp(out, before, sizeof out) != 0) abort();
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    const long runs = argc > 1 ? atol(argv[1]) : 0;
-    txm_rng rng = txm_rng_make(1, 0);
-    uint8_t data[USED];
-    if (runs < 1) {
-        fprintf(stderr, "usage: fuzz_texsyn_knit RUNS\n");
-        return 2;
-    }
-    for (long i = 0; i < runs; i++) {
-        for (int k = 0; k < USED; k++) data[k] = (uint8_t)txm_rng_next(&rng);
-        LLVMFuzzerTestOneInput(data, sizeof data);
-    }
-    printf("%ld runs, %ld knitted\n", runs, knitted);
-    return knitted > runs / 10 ? 0 : 1;
-}
-#endif

@@ -6,9 +6,10 @@
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
+#define FUZZ_BYTES 200
 #include "fuzzkit.h"
 
-enum { USED = 200, MOST_BYTES = 1 << 20 };
+enum { MOST_BYTES = 1 << 20 };
 
 static const int channels_of[4] = {1, 3, 4, 2};
 
@@ -154,15 +155,9 @@ static void compose(pool *p, source *s) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static pool p;
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     if (pick(&s, 3)) learn(&p, &s);
     else compose(&p, &s);
     drain(&p);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    return fuzz_main(argc, argv, USED);
-}
-#endif

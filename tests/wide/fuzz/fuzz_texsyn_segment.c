@@ -1,8 +1,5 @@
 /* fuzz_texsyn_segment.c - random pictures, masks and options into texsyn_segment
-   SPDX-License-Identifier: MIT OR Unlicense
-
-   With clang: -fsanitize=fuzzer,address,undefined. With any compiler: -DFUZZ_STANDALONE; the program
-   then makes the bytes itself: fuzz_texsyn_segment RUNS
+   SPDX-License-Identifier: MIT OR Unlicense; fuzzkit.h says how to run it
 
    The bytes choose size, channels, depth, strides, picture, mask, segments, transition, and which
    allocation fails. Each label must be there, by area, and nothing else; nothing is written after an
@@ -10,13 +7,10 @@
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
+#define FUZZ_BYTES 64
 #include "fuzzkit.h"
 
-enum { MOST_SIDE = 200, USED = 32, PAD = 3, FILL = 0x5c };
-
-static long accepted; /* calls that succeeded */
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+enum { MOST_SIDE = 200, PAD = 3, FILL = 0x5c };
 
 /* An image of its own block, exactly as large as it must be, filled with FILL; every other one
    bottom-up. */
@@ -91,7 +85,7 @@ static void judge_labels(const texsyn_segment_desc *d, const txm_image *out, int
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     texsyn_segment_desc d = {0};
     memory m = {0};
     txm_env env = {0};
@@ -109,7 +103,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (pick(&s, 6) == 0) m.fail_at = 1 + pick(&s, 60);
     const txm_status status = texsyn_segment(&d, &env, out, &count);
     if (status == TXM_OK) {
-        accepted++;
+        fuzz_succeeded++;
         judge_labels(&d, &out, count);
     } else if (!env.message[0] || count != -1 || !is_untouched(&out)) {
         abort();
@@ -120,17 +114,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     drop(&out);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    const long runs = argc > 1 ? atol(argv[1]) : 0;
-    for (long run = 0; run < runs; run++) {
-        uint8_t data[2 * USED];
-        txm_rng rng = txm_rng_make((uint64_t)run, 9);
-        for (size_t i = 0; i < sizeof data; i++) data[i] = (uint8_t)txm_rng_next(&rng);
-        LLVMFuzzerTestOneInput(data, sizeof data);
-    }
-    printf("%ld runs, %ld segmented\n", runs, accepted);
-    return accepted == 0 && runs > 0;
-}
-#endif

@@ -1,20 +1,14 @@
 /* fuzz_texsyn_weather.c - pictures and masks of all kinds into relighting and erosion
-   SPDX-License-Identifier: MIT OR Unlicense
+   SPDX-License-Identifier: MIT OR Unlicense; fuzzkit.h says how to run it
 
-   With clang: -fsanitize=fuzzer,address,undefined; the bytes choose sizes, strides, channels, depths,
-   values, masks and options. With any compiler: -DFUZZ_STANDALONE; the program then makes them up:
-   fuzz_texsyn_weather RUNS
-
+   The bytes choose sizes, strides, channels, depths, values, masks and options.
    What is refused must have a message and leave the output alone. What is eroded at one level must be
    part of the next; grays must stay gray.                                                       */
 #define TEXSYN_IMPLEMENTATION
 #include "texsyn.h"
 
+#define FUZZ_BYTES 1024
 #include "fuzzkit.h"
-
-static long accepted; /* calls so far */
-
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static float some_number(source *s) {
     static const float odd[8] = {NAN, INFINITY, -1, 1e6f, 2e6f, -1e6f, 1e-30f, 2};
@@ -59,7 +53,7 @@ static txm_image some_mask(source *s, const txm_image *like) {
 }
 
 static void judge(txm_status status, const txm_env *env) {
-    if (status == TXM_OK) accepted++;
+    if (status == TXM_OK) fuzz_succeeded++;
     else if (!env->message[0]) abort();
 }
 
@@ -133,22 +127,8 @@ static void fuzz_erosion(source *s) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     if (pick(&s, 2)) fuzz_relight(&s);
     else fuzz_erosion(&s);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    static uint8_t data[1 << 15];
-    const long runs = argc > 1 ? atol(argv[1]) : 0;
-    for (long run = 0; run < runs; run++) {
-        txm_rng rng = txm_rng_make((uint64_t)run, 7);
-        for (size_t i = 0; i < sizeof data; i++) data[i] = (uint8_t)txm_rng_next(&rng);
-        LLVMFuzzerTestOneInput(data, sizeof data);
-    }
-    printf("%ld runs, %ld calls accepted\n", runs, accepted);
-    return accepted == 0 && runs > 0;
-}
-#endif

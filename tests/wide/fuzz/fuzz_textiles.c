@@ -7,9 +7,10 @@
 #define TEXTILES_IMPLEMENTATION
 #include "textiles.h"
 
+#define FUZZ_BYTES 300
 #include "fuzzkit.h"
 
-enum { USED = 300, MOST_MAPS = 3, MOST_TILES = 600, MOST_CELLS = 400, MOST_FACES = 60, UNTOUCHED = -77 };
+enum { MOST_MAPS = 3, MOST_TILES = 600, MOST_CELLS = 400, MOST_FACES = 60, UNTOUCHED = -77 };
 
 static int classes[6][4], edge_exemplars[4];
 static trouble kept; /* a set that is cut releases with it */
@@ -219,7 +220,7 @@ static void assign(const textiles_set *set, pool *p, source *s) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static pool p;
-    source s = {data, size, 0};
+    source s = source_of(data, size);
     textiles_set *set = pick(&s, 12) ? import(&p, &s) : cut(&p, &s);
     if (set) {
         textiles_joints joints;
@@ -237,9 +238,3 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     drain(&p);
     return 0;
 }
-
-#ifdef FUZZ_STANDALONE
-int main(int argc, char **argv) {
-    return fuzz_main(argc, argv, USED);
-}
-#endif

@@ -2,33 +2,63 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    A program has one function, LLVMFuzzerTestOneInput, that makes calls from bytes. With clang,
-   -fsanitize=fuzzer,address,undefined runs it. With any compiler and -DFUZZ_STANDALONE, fuzz_main is its
-   main: it makes the bytes itself, the same ones for the same seed: NAME RUNS [SEED]              */
+   -fsanitize=fuzzer,address,undefined runs it. With any compiler and -DFUZZ_STANDALONE main is here,
+   for programs that define FUZZ_BYTES before the include. It makes so many bytes for each run, the same
+   for the same seed and number, and tells which run went wrong: NAME RUNS [SEED [FIRST]]         */
 #ifndef FUZZKIT_H
 #define FUZZKIT_H
 
 #include "texmath.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/time.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static long fuzz_succeeded; /* calls that did their work */
 
+/* Ends the program unless what must hold does. */
+#define must(holds) ((holds) ? (void)0 : fuzz_fail(#holds, __FILE__, __LINE__))
+static inline void fuzz_fail(const char *what, const char *file, int line) {
+    fprintf(stderr, "%s:%d: %s does not hold\n", file, line, what);
+    abort();
+}
+
 /* ---- bytes that choose ------------------------------------------------------------------- */
 
-typedef struct source { /* bytes, then zeros */
+typedef struct source { /* bytes, then what a generator seeded with them gives */
     const uint8_t *data;
     size_t size, at;
+    txm_rng rng;
 } source;
+
+static inline source source_of(const uint8_t *data, size_t size) {
+    source s;
+    uint64_t hash = 0;
+    for (size_t i = 0; i < size; i++) hash = txm_hash(hash + data[i]);
+    s.data = data;
+    s.size = size;
+    s.at = 0;
+    s.rng = txm_rng_make(hash, 1);
+    return s;
+}
+
+static inline int pick_byte(source *s) {
+    return s->at < s->size ? s->data[s->at++] : (int)txm_rng_below(&s->rng, 256);
+}
 
 /* A number below count. */
 static inline int pick(source *s, int count) {
-    const int high = s->at < s->size ? s->data[s->at++] : 0;
-    const int low = s->at < s->size ? s->data[s->at++] : 0;
+    const int high = pick_byte(s), low = pick_byte(s);
     return (256 * high + low) % count;
+}
+
+/* A number from 0 to 1, always of the generator. */
+static inline float unit(source *s) {
+    return txm_rng_float(&s->rng);
 }
 
 /* ---- memory ------------------------------------------------------------------------------- */
@@ -283,23 +313,54 @@ static inline void draw_image(const txm_image *im, int kind, txm_rng *rng) {
 
 /* ---- running by itself -------------------------------------------------------------------- */
 
-/* RUNS inputs of that many bytes; fails if hardly any call did its work. */
-static inline int fuzz_main(int argc, char **argv, size_t bytes) {
-    const long runs = argc > 1 ? atol(argv[1]) : 0;
-    txm_rng rng = txm_rng_make(argc > 2 ? (uint64_t)atol(argv[2]) : 1, 0);
+#if defined(FUZZ_STANDALONE) && defined(FUZZ_BYTES)
+
+/* what the sanitizers find is told like what abort() finds */
+const char *__asan_default_options(void), *__ubsan_default_options(void);
+const char *__asan_default_options(void) {
+    return "abort_on_error=1";
+}
+const char *__ubsan_default_options(void) {
+    return "abort_on_error=1";
+}
+
+enum { FUZZ_SECONDS = 120 }; /* of the processor, for one run: more is an error */
+
+void __attribute__((weak)) __sanitizer_print_stack_trace(void);
+
+static long fuzz_run, fuzz_seed;
+
+static void fuzz_tell(int number) {
+    fprintf(stderr, "run %ld of seed %ld: signal %d\n", fuzz_run, fuzz_seed, number);
+    if (__sanitizer_print_stack_trace) __sanitizer_print_stack_trace();
+    signal(number, SIG_DFL);
+    raise(number);
+}
+
+/* RUNS inputs; fails if hardly any call did its work. */
+int main(int argc, char **argv) {
+    const long runs = argc > 1 ? atol(argv[1]) : 0, first = argc > 3 ? atol(argv[3]) : 0;
+    const struct itimerval limit = {{0, 0}, {FUZZ_SECONDS, 0}};
+    fuzz_seed = argc > 2 ? atol(argv[2]) : 1;
     if (runs < 1) {
-        fprintf(stderr, "usage: %s RUNS [SEED]\n", argv[0]);
+        fprintf(stderr, "usage: %s RUNS [SEED [FIRST]]\n", argv[0]);
         return 2;
     }
-    for (long i = 0; i < runs; i++) {
-        uint8_t *data = (uint8_t *)malloc(bytes);
+    signal(SIGABRT, fuzz_tell);
+    signal(SIGVTALRM, fuzz_tell);
+    for (fuzz_run = first; fuzz_run < first + runs; fuzz_run++) {
+        uint8_t *data = (uint8_t *)malloc(FUZZ_BYTES);
+        txm_rng rng = txm_rng_make((uint64_t)fuzz_seed, (uint64_t)fuzz_run);
         if (!data) return 1;
-        for (size_t k = 0; k < bytes; k++) data[k] = (uint8_t)(txm_rng_next(&rng) >> 7);
-        LLVMFuzzerTestOneInput(data, bytes);
+        for (size_t k = 0; k < FUZZ_BYTES; k++) data[k] = (uint8_t)(txm_rng_next(&rng) >> 7);
+        setitimer(ITIMER_VIRTUAL, &limit, NULL);
+        LLVMFuzzerTestOneInput(data, FUZZ_BYTES);
         free(data);
     }
     printf("%ld runs, %ld calls succeeded\n", runs, fuzz_succeeded);
     return fuzz_succeeded >= runs / 10 ? 0 : 1;
 }
+
+#endif
 
 #endif /* FUZZKIT_H */

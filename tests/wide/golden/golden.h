@@ -17,6 +17,22 @@
 
 #include "testkit.h"
 
+/* ---- hashes ------------------------------------------------------------------------------ */
+
+/* tk_hash of numbers of `unit` bytes each, their lowest byte first whatever the machine does. */
+static inline uint64_t golden_hash(uint64_t start, const void *numbers, size_t count, size_t unit) {
+    static const uint16_t one = 1;
+    const unsigned char *p = (const unsigned char *)numbers;
+    unsigned char little[8];
+    uint64_t hash = start;
+    if (*(const unsigned char *)&one == 1) return tk_hash(start, numbers, count);
+    for (size_t i = 0; i < count; i += unit) {
+        for (size_t k = 0; k < unit; k++) little[k] = p[i + unit - 1 - k];
+        hash = tk_hash(hash, little, unit);
+    }
+    return hash;
+}
+
 /* ---- cases ------------------------------------------------------------------------------- */
 
 typedef struct golden_case {

@@ -10,15 +10,15 @@ static uint8_t exemplar[SIDE * SIDE * 3], out[WIDTH * HEIGHT * 3];
 
 static uint64_t edges_hash(const texedges_set *edges, uint64_t hash) {
     const int numbers[3] = {edges->levels, edges->width, edges->height};
-    hash = tk_hash(hash, numbers, sizeof numbers);
-    hash = tk_hash(hash, edges->thresholds, (size_t)(edges->levels - 1) * sizeof(float));
-    hash = tk_hash(hash, edges->beside, (size_t)edges->levels * sizeof(int));
+    hash = golden_hash(hash, numbers, sizeof numbers, 4);
+    hash = golden_hash(hash, edges->thresholds, (size_t)(edges->levels - 1) * sizeof(float), 4);
+    hash = golden_hash(hash, edges->beside, (size_t)edges->levels * sizeof(int), 4);
     for (size_t i = 0; i < edges->line_count; i++) {
         const uint64_t line[4] = {(uint64_t)edges->lines[i].layer, (uint64_t)edges->lines[i].is_hole,
                                   edges->lines[i].first, edges->lines[i].count};
-        hash = tk_hash(hash, line, sizeof line);
+        hash = golden_hash(hash, line, sizeof line, 8);
     }
-    return tk_hash(hash, edges->points, edges->point_count * sizeof *edges->points);
+    return golden_hash(hash, edges->points, edges->point_count * sizeof *edges->points, 4);
 }
 
 static texedges_desc describe(int channels) {

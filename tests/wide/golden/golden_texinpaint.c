@@ -48,8 +48,9 @@ static uint64_t complete(const texinpaint_desc *desc, txm_env *env) {
     const txm_image *i = &desc->image;
     const txm_image image = golden_image(out, i->width, i->height, i->channels, i->sample);
     golden_need(texinpaint_complete(desc, env, &image), "complete", env);
-    return tk_hash(0, out, (size_t)i->width * (size_t)i->height * (size_t)i->channels *
-                               (i->sample == TXM_U16 ? 2 : 1));
+    const size_t unit = txm_sample_bytes(i->sample);
+    const size_t samples = (size_t)i->width * (size_t)i->height * (size_t)i->channels;
+    return golden_hash(0, out, samples * unit, unit);
 }
 
 /* what it finds best, and each structure by itself */
@@ -138,7 +139,7 @@ static uint64_t maps(txm_env *env) {
         golden_need(texinpaint_step(job, env, &more), "step", env);
         for (int m = 0; m < 4; m++) golden_need(texinpaint_draw(job, m, env, &to[m]), "draw", env);
         hash = tk_hash(hash, out, SIDE * SIDE * 3);
-        hash = tk_hash(hash, deep_out, sizeof deep_out);
+        hash = golden_hash(hash, deep_out, sizeof deep_out, 2);
         hash = tk_hash(hash, normal_out, sizeof normal_out);
         hash = tk_hash(hash, label_out, sizeof label_out);
     }
@@ -228,8 +229,8 @@ static uint64_t crest(txm_env *env) {
     for (desc.kinds = 0; desc.kinds < 3; desc.kinds++) {
         golden_need(texinpaint_crest(&desc, env, &crests), "crest", env);
         for (size_t i = 0; i < crests->line_count; i++)
-            hash = tk_hash(hash, crests->lines[i].points,
-                           (size_t)crests->lines[i].count * 3 * sizeof(float));
+            hash = golden_hash(hash, crests->lines[i].points,
+                               (size_t)crests->lines[i].count * 3 * sizeof(float), 4);
         texinpaint_crests_free(crests);
     }
     return hash;

@@ -14,14 +14,14 @@ static uint64_t random_numbers(txm_env *env) {
             const float f = txm_rng_float(&rng);
             const double d = txm_rng_double(&rng);
             items[i] = i;
-            hash = tk_hash(hash, &next, sizeof next);
-            hash = tk_hash(hash, &below, sizeof below);
-            hash = tk_hash(hash, &range, sizeof range);
-            hash = tk_hash(hash, &f, sizeof f);
-            hash = tk_hash(hash, &d, sizeof d);
+            hash = golden_hash(hash, &next, sizeof next, 4);
+            hash = golden_hash(hash, &below, sizeof below, 4);
+            hash = golden_hash(hash, &range, sizeof range, 4);
+            hash = golden_hash(hash, &f, sizeof f, 4);
+            hash = golden_hash(hash, &d, sizeof d, 8);
         }
         txm_shuffle(&rng, items, 100);
-        hash = tk_hash(hash, items, sizeof items);
+        hash = golden_hash(hash, items, sizeof items, 4);
     }
     return hash;
 }
@@ -36,7 +36,7 @@ static uint64_t sort(txm_env *env) {
         pairs[i].value = i;
     }
     txm_sort_pairs(pairs, scratch, COUNT);
-    return tk_hash(0, pairs, sizeof pairs);
+    return golden_hash(0, pairs, sizeof pairs, 4);
 }
 
 static uint64_t eigen(txm_env *env) {
@@ -47,8 +47,8 @@ static uint64_t eigen(txm_env *env) {
         for (int k = 0; k < 6; k++) a[k] = txm_rng_double(&rng) * 4 - (k >= 3 ? 2 : 0);
         if (i % 10 == 0) a[3] = a[4] = a[5] = 0;
         golden_need(txm_eigen3(a, values, vectors), "eigen3", env);
-        hash = tk_hash(hash, values, sizeof values);
-        hash = tk_hash(hash, vectors, sizeof vectors);
+        hash = golden_hash(hash, values, sizeof values, 8);
+        hash = golden_hash(hash, vectors, sizeof vectors, 8);
     }
     return hash;
 }
@@ -64,11 +64,11 @@ static uint64_t cut(txm_env *env) {
     for (int i = 0; i < LENGTH * WIDE; i++)
         error[i] = i % 29 == 3 ? INFINITY : (float)txm_rng_below(&rng, 50);
     const double down = txm_cut(error, LENGTH, WIDE, WIDE, 1, path, scratch);
-    hash = tk_hash(hash, &down, sizeof down);
-    hash = tk_hash(hash, path, sizeof path);
+    hash = golden_hash(hash, &down, sizeof down, 8);
+    hash = golden_hash(hash, path, sizeof path, 4);
     const double right = txm_cut(error, WIDE, LENGTH, 1, WIDE, path, scratch);
-    hash = tk_hash(hash, &right, sizeof right);
-    return tk_hash(hash, path, WIDE * sizeof *path);
+    hash = golden_hash(hash, &right, sizeof right, 8);
+    return golden_hash(hash, path, WIDE * sizeof *path, 4);
 }
 
 /* a minimum cut on a grid with 4 and with 6 directions */
@@ -105,7 +105,7 @@ static uint64_t flow(txm_env *env) {
         txm_flow_solve(&g);
         for (int p = 0; p < COUNT; p++) {
             const int sink = g.tree[p] == TXM_FLOW_SINK;
-            hash = tk_hash(hash, &sink, sizeof sink);
+            hash = golden_hash(hash, &sink, sizeof sink, 4);
         }
         txm_arena_free(&arena);
     }
@@ -123,7 +123,7 @@ static uint64_t halve(txm_env *env) {
         const txm_image half = golden_image(to, 31, 25, channels, TXM_F32);
         golden_need(txm_image_halve(&image, kind == 2 ? TXM_NORMALS : TXM_COLOR, 0, &half, env),
                     "halve", env);
-        hash = tk_hash(hash, to, (size_t)(31 * 25 * channels) * sizeof(float));
+        hash = golden_hash(hash, to, (size_t)(31 * 25 * channels) * sizeof(float), 4);
     }
     return hash;
 }
@@ -142,7 +142,7 @@ static uint64_t cutout(txm_env *env) {
     golden_need(txm_image_set_coverage(&half, txm_image_coverage(&image, 0.5f), 0.5f, env),
                 "coverage", env);
     golden_need(txm_image_bleed(&image, TXM_WRAP_X, env), "bleed", env);
-    return tk_hash(tk_hash(0, to, sizeof to), from, sizeof from);
+    return golden_hash(golden_hash(0, to, sizeof to, 2), from, sizeof from, 2);
 }
 
 static uint64_t poisson_hash(float screen, int with_target, txm_env *env) {
@@ -166,7 +166,7 @@ static uint64_t poisson_hash(float screen, int with_target, txm_env *env) {
     if (with_target) desc.target = golden_image(target, WIDE, HIGH, 3, TXM_F32);
     desc.screen = screen;
     golden_need(txm_poisson(&desc, env), "poisson", env);
-    return tk_hash(0, image, sizeof image);
+    return golden_hash(0, image, sizeof image, 4);
 }
 
 static uint64_t membrane(txm_env *env) {
@@ -192,10 +192,10 @@ static uint64_t samples(txm_env *env) {
             txm_image_set(&image, i % 4, i / 4 % 4, i / 16, value);
             txm_image_set(&deep, i % 4, i / 4 % 4, i / 16, value);
             const float got = txm_image_get(&deep, i % 4, i / 4 % 4, i / 16);
-            hash = tk_hash(hash, &got, sizeof got);
+            hash = golden_hash(hash, &got, sizeof got, 4);
         }
         hash = tk_hash(hash, bytes, sizeof bytes);
-        hash = tk_hash(hash, words, sizeof words);
+        hash = golden_hash(hash, words, sizeof words, 2);
     }
     return hash;
 }
@@ -222,10 +222,11 @@ static uint64_t light(txm_env *env) {
                               (0.1f + 0.6f * txm_rng_float(&rng)) * (float)(x + 40) / 130.0f);
         }
         golden_need(txm_uneven(&desc, env, &stops), "uneven", env);
-        hash = tk_hash(hash, &stops, sizeof stops);
+        hash = golden_hash(hash, &stops, sizeof stops, 4);
         desc.radius = 20;
         golden_need(txm_even(&desc, env, &desc.image), "even", env);
-        hash = tk_hash(hash, pixels, (size_t)(WIDE * HIGH * 3) * txm_sample_bytes(samples[k]));
+        const size_t unit = txm_sample_bytes(samples[k]);
+        hash = golden_hash(hash, pixels, WIDE * HIGH * 3 * unit, unit);
     }
     return hash;
 }
@@ -246,8 +247,8 @@ static uint64_t turns(txm_env *env) {
         const txm_quat q = {txm_float(a.x), txm_float(a.y), txm_float(a.z), txm_float(a.w)};
         const txm_vec3 v = rounded(txm_quat_rotate(q, txm_d3(n[4], n[5], n[6])));
         const txm_vec3 across = txm_vec3_normalize(txm_vec3_cross(v, txm_v3(n[4], n[5], n[6])));
-        hash = tk_hash(hash, &v, sizeof v);
-        hash = tk_hash(hash, &across, sizeof across);
+        hash = golden_hash(hash, &v, sizeof v, 4);
+        hash = golden_hash(hash, &across, sizeof across, 4);
     }
     return hash;
 }
@@ -265,8 +266,8 @@ static uint64_t frames(txm_env *env) {
         const txm_quat q = txm_quat_from_axes(x, txm_d3_cross(z, x), z);
         const txm_quat r = txm_quat_mul(txm_quat_unit((txm_quat){n[6], n[7], n[8], n[9]}),
                                         txm_quat_conjugate(txm_quat_unit(q)));
-        hash = tk_hash(hash, &q, sizeof q);
-        hash = tk_hash(hash, &r, sizeof r);
+        hash = golden_hash(hash, &q, sizeof q, 8);
+        hash = golden_hash(hash, &r, sizeof r, 8);
     }
     return hash;
 }

@@ -67,8 +67,8 @@ static uint64_t lattice(txm_env *env) {
     const int found = texpatch_lattice(job, vectors);
     texpatch_free(job);
     uint64_t hash = make(&desc, 3, env);
-    hash = tk_hash(hash, &found, sizeof found);
-    return tk_hash(hash, vectors, sizeof vectors);
+    hash = golden_hash(hash, &found, sizeof found, 4);
+    return golden_hash(hash, vectors, sizeof vectors, 4);
 }
 
 /* a lattice that the caller tells, patches alone */
@@ -131,8 +131,8 @@ static uint64_t maps(txm_env *env) {
                              golden_image(label_out, WIDTH, HEIGHT, 1, TXM_U8)};
     golden_need(texpatch_make(&desc, env, to), "make", env);
     uint64_t hash = tk_hash(0, out, WIDTH * HEIGHT * 3);
-    hash = tk_hash(hash, normal_out, sizeof normal_out);
-    hash = tk_hash(hash, height_out, sizeof height_out);
+    hash = golden_hash(hash, normal_out, sizeof normal_out, 4);
+    hash = golden_hash(hash, height_out, sizeof height_out, 2);
     hash = tk_hash(hash, label_out, sizeof label_out);
     return hash;
 }
@@ -191,7 +191,7 @@ static uint64_t again(txm_env *env) {
     for (int i = 0; i < WIDTH * HEIGHT; i++) {
         const texpatch_source s = texpatch_source_at(job, i % WIDTH, i / WIDTH);
         const float numbers[4] = {s.x, s.y, (float)s.exemplar, (float)s.turn};
-        hash = tk_hash(hash, numbers, sizeof numbers);
+        hash = golden_hash(hash, numbers, sizeof numbers, 4);
     }
     texpatch_free(job);
     return hash;
@@ -216,7 +216,7 @@ static uint64_t plane(txm_env *env) {
         hash = tk_hash(hash, out, 20 * 30);
         for (int i = 0; i < 20 * 30; i++) {
             const float numbers[3] = {sources[i].x, sources[i].y, (float)sources[i].turn};
-            hash = tk_hash(hash, numbers, sizeof numbers);
+            hash = golden_hash(hash, numbers, sizeof numbers, 4);
         }
     }
     texpatch_plane_free(p);
@@ -270,7 +270,7 @@ static uint64_t half(txm_env *env) {
         golden_need(texpatch_half(&from, kind ? &map : NULL, 0, env, &to), "half", env);
         golden_need(texpatch_half(&from_deep, kind ? &map : NULL, 0, env, &to_deep), "half", env);
         hash = tk_hash(hash, out, HALF * HALF * 3);
-        hash = tk_hash(hash, deep_half, sizeof deep_half);
+        hash = golden_hash(hash, deep_half, sizeof deep_half, 2);
     }
     return hash;
 }

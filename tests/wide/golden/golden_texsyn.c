@@ -40,8 +40,8 @@ static uint64_t both(const texsyn_learn_desc *learn, int channels, txm_sample sa
     synth.seed = 3;
     const txm_image out = golden_image(picture, WIDTH, HEIGHT, channels, sample);
     golden_need(texsyn_synthesize(&synth, env, out), "synthesize", env);
-    hash = tk_hash(hash, picture,
-                   (size_t)WIDTH * HEIGHT * (size_t)channels * txm_sample_bytes(sample));
+    const size_t unit = txm_sample_bytes(sample);
+    hash = golden_hash(hash, picture, (size_t)WIDTH * HEIGHT * (size_t)channels * unit, unit);
     texsyn_model_free(model);
     return hash;
 }
@@ -125,8 +125,8 @@ static uint64_t file(txm_env *env) {
         const int count = texsyn_clique_at(again, i, &clique, bins, 1024);
         const int numbers[9] = {(int)clique.kind, clique.level, clique.band, clique.other, clique.dx,
                                 clique.dy,        clique.ex,    clique.ey,   clique.phase};
-        hash = tk_hash(hash, numbers, sizeof numbers);
-        hash = tk_hash(hash, bins, (size_t)count * sizeof *bins);
+        hash = golden_hash(hash, numbers, sizeof numbers, 4);
+        hash = golden_hash(hash, bins, (size_t)count * sizeof *bins, 4);
     }
     texsyn_model_free(model);
     texsyn_model_free(again);
@@ -147,7 +147,8 @@ static uint64_t relit(txm_env *env) {
         desc.like = golden_image(like, SIDE, SIDE, 3, TXM_U8);
         const txm_image out = golden_image(picture, SIDE, SIDE, 3, samples[s]);
         golden_need(texsyn_relight(&desc, env, out), "relight", env);
-        hash = tk_hash(hash, picture, (size_t)SIDE * SIDE * 3 * txm_sample_bytes(samples[s]));
+        const size_t unit = txm_sample_bytes(samples[s]);
+        hash = golden_hash(hash, picture, (size_t)SIDE * SIDE * 3 * unit, unit);
     }
     return hash;
 }
@@ -236,7 +237,7 @@ static uint64_t segments(txm_env *env) {
         desc.transition = forced > 0;
         golden_need(texsyn_segment(&desc, env, golden_image(labels, SEGMENT_SIDE, SEGMENT_SIDE, 1,
                                                             TXM_U8), &count), "segment", env);
-        hash = tk_hash(hash, &count, sizeof count);
+        hash = golden_hash(hash, &count, sizeof count, 4);
         hash = tk_hash(hash, labels, sizeof labels);
     }
     return hash;
@@ -265,7 +266,8 @@ static uint64_t fill_as(int channels, txm_sample sample, int known, txm_env *env
     golden_need(texsyn_fill(&desc, env, golden_image(out, SIDE, SIDE, channels, sample)), "fill",
                 env);
     texsyn_model_free(model);
-    return tk_hash(0, out, (size_t)SIDE * SIDE * (size_t)channels * txm_sample_bytes(sample));
+    const size_t unit = txm_sample_bytes(sample);
+    return golden_hash(0, out, (size_t)SIDE * SIDE * (size_t)channels * unit, unit);
 }
 
 static uint64_t fill_rgb(txm_env *env) {

@@ -41,14 +41,14 @@ static uint64_t set_hash(const textiles_set *set, txm_env *env, uint64_t hash) {
         textiles_tile tile;
         memset(&tile, 0, sizeof tile);
         textiles_tile_at(set, t, &tile);
-        hash = tk_hash(hash, tile.edges, (size_t)(4 - triangle) * sizeof(int));
+        hash = golden_hash(hash, tile.edges, (size_t)(4 - triangle) * sizeof(int), 4);
         golden_need(textiles_draw_tile(set, t, 0, 0, env, image), "draw a tile", env);
         for (int y = 0; y < side; y++) {
             for (int x = 0; x < (triangle ? side - y : side); x++) {
                 float from[2] = {0, 0};
                 const int e = textiles_source(set, t, x, y, from);
-                hash = tk_hash(hash, &e, sizeof e);
-                hash = tk_hash(hash, from, sizeof from);
+                hash = golden_hash(hash, &e, sizeof e, 4);
+                hash = golden_hash(hash, from, sizeof from, 4);
                 hash = tk_hash(hash, out + (y * side + x) * channels, (size_t)channels);
             }
         }
@@ -106,7 +106,7 @@ static uint64_t frame(txm_env *env) {
     const txm_image image = golden_image(values, SMALL, SMALL, 1, TXM_F32);
     for (int t = 0; t < textiles_count(set); t++) {
         golden_need(textiles_draw_tile(set, t, 4, 1, env, image), "draw a tile", env);
-        hash = tk_hash(hash, values, sizeof values);
+        hash = golden_hash(hash, values, sizeof values, 4);
     }
     textiles_set_free(set);
     return hash;
@@ -125,8 +125,8 @@ static uint64_t atlas_hash(textiles_set *set, textiles_packing packing, int gutt
         int at[3] = {0, 0, 0};
         float uv[4][2] = {{0, 0}, {0, 0}, {0, 0}, {0, 0}};
         textiles_place(&layout, t, &at[0], &at[1], &at[2], uv);
-        hash = tk_hash(hash, at, sizeof at);
-        hash = tk_hash(hash, uv, sizeof uv);
+        hash = golden_hash(hash, at, sizeof at, 4);
+        hash = golden_hash(hash, uv, sizeof uv, 4);
     }
     return tk_hash(hash, out, bytes);
 }
@@ -163,7 +163,7 @@ static uint64_t planes(txm_env *env) {
                 tiles[i] = tiles[i] * 4 + turn;
             }
         } else textiles_plane_fill(&plane, -2000000000, 17, 50, 40, tiles);
-        hash = tk_hash(hash, tiles, sizeof tiles);
+        hash = golden_hash(hash, tiles, sizeof tiles, 4);
         const size_t bytes = (size_t)layout.width * (size_t)layout.height;
         const txm_image atlas = golden_image(out, layout.width, layout.height, 1, TXM_U8);
         const txm_image window = golden_image(out + bytes, 90, 70, 1, TXM_U8);
@@ -183,14 +183,14 @@ static uint64_t grids(txm_env *env) {
     for (int kind = TEXTILES_WANG; kind <= TEXTILES_CORNER; kind++) {
         textiles_set *set = make((textiles_kind)kind, 1, 2, env);
         golden_need(textiles_scanline(set, 60, 50, 5, env, tiles), "scanline", env);
-        hash = tk_hash(hash, tiles, sizeof tiles);
+        hash = golden_hash(hash, tiles, sizeof tiles, 4);
         for (int i = 0; i < 60 * 50; i++)
             if (i % 7 || i / 60 % 5) tiles[i] = -1;
         golden_need(textiles_solve(set, 60, 50, 0, 6, env, tiles), "solve", env);
-        hash = tk_hash(hash, tiles, sizeof tiles);
+        hash = golden_hash(hash, tiles, sizeof tiles, 4);
         for (int i = 1; i < 60 * 50; i++) tiles[i] = -1;
         golden_need(textiles_solve(set, 60, 50, 1, 7, env, tiles), "solve", env);
-        hash = tk_hash(hash, tiles, sizeof tiles);
+        hash = golden_hash(hash, tiles, sizeof tiles, 4);
         textiles_set_free(set);
     }
     return hash;
@@ -213,18 +213,18 @@ static uint64_t meshes(txm_env *env) {
     textiles_set *set = make(TEXTILES_TRIANGLE, 1, 2, env);
     golden_need(textiles_assign_triangles(set, triangles, 2 * N * N, N * N, 4, env, tiles, turns),
                 "triangles", env);
-    hash = tk_hash(hash, tiles, sizeof tiles);
-    hash = tk_hash(hash, turns, sizeof turns);
+    hash = golden_hash(hash, tiles, sizeof tiles, 4);
+    hash = golden_hash(hash, turns, sizeof turns, 4);
     golden_need(textiles_measure(set, 0, env, &joints), "measure", env);
     const double triangle_joints[4] = {joints.mean, joints.worst, joints.least, joints.overall};
-    hash = tk_hash(hash, triangle_joints, sizeof triangle_joints);
+    hash = golden_hash(hash, triangle_joints, sizeof triangle_joints, 8);
     textiles_set_free(set);
     set = make(TEXTILES_WANG, 1, 1, env);
     golden_need(textiles_assign_quads(set, quads, N * N, N * N, NULL, 4, env, tiles), "quads", env);
-    hash = tk_hash(hash, tiles, N * N * sizeof *tiles);
+    hash = golden_hash(hash, tiles, N * N * sizeof *tiles, 4);
     golden_need(textiles_measure(set, 0, env, &joints), "measure", env);
     const double square_joints[4] = {joints.mean, joints.worst, joints.least, joints.overall};
-    hash = tk_hash(hash, square_joints, sizeof square_joints);
+    hash = golden_hash(hash, square_joints, sizeof square_joints, 8);
     textiles_set_free(set);
     return hash;
 }

@@ -38,22 +38,27 @@ static treepieces_forest *grow(const treepieces_kit *kit, int trees, int rule, t
 }
 
 static uint64_t forest_hash(const treepieces_forest *forest, uint64_t hash) {
-    hash = tk_hash(hash, forest->nodes, forest->node_count * sizeof *forest->nodes);
-    hash = tk_hash(hash, forest->clusters, forest->cluster_count * sizeof *forest->clusters);
+    for (size_t i = 0; i < forest->node_count; i++) {
+        const treepieces_node *node = &forest->nodes[i];
+        const size_t numbers = offsetof(treepieces_node, type);
+        hash = golden_hash(hash, node, numbers, 4);
+        hash = tk_hash(hash, &node->type, sizeof *node - numbers);
+    }
+    hash = golden_hash(hash, forest->clusters, forest->cluster_count * sizeof *forest->clusters, 4);
     for (int t = 0; t < forest->type_count; t++) {
         const treepieces_batch *b = &forest->batches[t];
-        if (b->count) hash = tk_hash(hash, b->words, (size_t)b->count * b->stride * 4);
+        if (b->count) hash = golden_hash(hash, b->words, (size_t)b->count * b->stride * 4, 4);
     }
     return hash;
 }
 
 static uint64_t mesh_hash(const treepieces_mesh *mesh, uint64_t hash) {
-    hash = tk_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float));
-    hash = tk_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float));
-    hash = tk_hash(hash, mesh->joints, 4 * mesh->vertex_count * sizeof(uint32_t));
-    hash = tk_hash(hash, mesh->weights, 4 * mesh->vertex_count * sizeof(float));
-    hash = tk_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t));
-    return tk_hash(hash, mesh->uvs, 6 * mesh->triangle_count * sizeof(float));
+    hash = golden_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float), 4);
+    hash = golden_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float), 4);
+    hash = golden_hash(hash, mesh->joints, 4 * mesh->vertex_count * sizeof(uint32_t), 4);
+    hash = golden_hash(hash, mesh->weights, 4 * mesh->vertex_count * sizeof(float), 4);
+    hash = golden_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t), 4);
+    return golden_hash(hash, mesh->uvs, 6 * mesh->triangle_count * sizeof(float), 4);
 }
 
 /* the built-in pieces, each skinned by bones of its own tree below */
@@ -62,11 +67,11 @@ static uint64_t pieces(txm_env *env) {
     uint64_t hash = 0;
     for (int t = 0; t < treepieces_kit_count(kit); t++) {
         const treepieces_piece *p = treepieces_kit_piece(kit, t);
-        hash = tk_hash(hash, p->vertices, (size_t)p->vertex_count * sizeof *p->vertices);
+        hash = golden_hash(hash, p->vertices, (size_t)p->vertex_count * sizeof *p->vertices, 4);
         hash = tk_hash(hash, p->quads, (size_t)p->quad_count * sizeof *p->quads);
         for (int k = 0; k < p->leaf_count; k++) {
-            hash = tk_hash(hash, p->leaf_rims[k], sizeof p->leaf_rims[k]);
-            hash = tk_hash(hash, &p->building[k], sizeof p->building[k]);
+            hash = golden_hash(hash, p->leaf_rims[k], sizeof p->leaf_rims[k], 4);
+            hash = golden_hash(hash, &p->building[k], sizeof p->building[k], 4);
         }
     }
     treepieces_kit_free(kit);
@@ -134,19 +139,19 @@ static uint64_t wind(txm_env *env) {
     treepieces_forest *forest = grow(kit, TREES, TREEPIECES_GRAMMAR, env);
     const size_t floats = forest->node_count * TREEPIECES_BONE;
     golden_need(treepieces_bones(forest, &pose, env, bones), "bones", env);
-    uint64_t hash = tk_hash(0, bones, floats * sizeof *bones);
+    uint64_t hash = golden_hash(0, bones, floats * sizeof *bones, 4);
     memset(sway, 0, sizeof sway);
     for (int i = 0; i < 9; i++)
         golden_need(treepieces_sway(forest, &blow, 0.1 * i, 0.1, i < 5 ? NULL : &pose, env, sway, bones),
                     "sway", env);
-    hash = tk_hash(hash, bones, floats * sizeof *bones);
-    hash = tk_hash(hash, sway, 4 * forest->node_count * sizeof *sway);
+    hash = golden_hash(hash, bones, floats * sizeof *bones, 4);
+    hash = golden_hash(hash, sway, 4 * forest->node_count * sizeof *sway, 4);
     for (int t = 0; t < forest->type_count; t++) {
         const size_t vertices = (size_t)treepieces_kit_piece(kit, t)->vertex_count;
         for (uint32_t i = 0; i < forest->batches[t].count; i += 9) {
             treepieces_skin(forest, bones, t, i, positions, normals);
-            hash = tk_hash(hash, positions, 3 * vertices * sizeof(float));
-            hash = tk_hash(hash, normals, 3 * vertices * sizeof(float));
+            hash = golden_hash(hash, positions, 3 * vertices * sizeof(float), 4);
+            hash = golden_hash(hash, normals, 3 * vertices * sizeof(float), 4);
         }
     }
     treepieces_forest_free(forest);
@@ -193,8 +198,8 @@ static uint64_t tessellation(txm_env *env) {
     for (int k = 0; k < 4; k++) {
         int triangles = 0;
         const int count = treepieces_pattern(levels[k], levels[k][4], coords, indices, &triangles);
-        hash = tk_hash(hash, coords, 2 * (size_t)count * sizeof(float));
-        hash = tk_hash(hash, indices, 3 * (size_t)triangles * sizeof(uint16_t));
+        hash = golden_hash(hash, coords, 2 * (size_t)count * sizeof(float), 4);
+        hash = golden_hash(hash, indices, 3 * (size_t)triangles * sizeof(uint16_t), 2);
     }
     for (int k = 0; k < 50; k++) {
         float p[12], n[12], at[3], normal[3];
@@ -206,9 +211,9 @@ static uint64_t tessellation(txm_env *env) {
         const float u = txm_rng_float(&rng), v = txm_rng_float(&rng);
         treepieces_patch_point(p, n, 0.6f, u, v, at, normal);
         const int level[2] = {treepieces_edge_level(&lod, p, p + 3), treepieces_inner_level(&lod, p)};
-        hash = tk_hash(hash, at, sizeof at);
-        hash = tk_hash(hash, normal, sizeof normal);
-        hash = tk_hash(hash, level, sizeof level);
+        hash = golden_hash(hash, at, sizeof at, 4);
+        hash = golden_hash(hash, normal, sizeof normal, 4);
+        hash = golden_hash(hash, level, sizeof level, 4);
     }
     return hash;
 }
@@ -250,7 +255,7 @@ static uint64_t leaves(txm_env *env) {
     for (int preset = 0; preset < treepieces_preset_count(); preset++) {
         read_species(preset, env);
         const int count = treepieces_cloud(&species, 3, cards);
-        hash = tk_hash(hash, cards, (size_t)count * sizeof *cards);
+        hash = golden_hash(hash, cards, (size_t)count * sizeof *cards, 4);
         if (count < 1) continue;
         treepieces_impostor_desc desc;
         memset(&desc, 0, sizeof desc);
@@ -266,7 +271,7 @@ static uint64_t leaves(txm_env *env) {
                                         golden_image(depth, PICTURE, PICTURE, 1, TXM_F32)),
                     "impostor", env);
         hash = tk_hash(hash, color, sizeof color);
-        hash = tk_hash(hash, depth, sizeof depth);
+        hash = golden_hash(hash, depth, sizeof depth, 4);
     }
     return hash;
 }

@@ -29,7 +29,7 @@ static uint64_t normals(txm_env *env) {
         golden_ring(&surface, open);
         const txm_mesh v = view();
         golden_need(trimesh_normals(&v, env, values), "normals", env);
-        hash = tk_hash(hash, values, 3 * v.vertex_count * sizeof(float));
+        hash = golden_hash(hash, values, 3 * v.vertex_count * sizeof(float), 4);
     }
     return hash;
 }
@@ -59,7 +59,7 @@ static uint64_t transfer(txm_env *env) {
     v.count = surface.vertex_count;
     v.channels = 4;
     golden_need(trimesh_transfer(&input, &v, sources, count, env, values), "transfer", env);
-    return tk_hash(0, values, 4 * count * sizeof(float));
+    return golden_hash(0, values, 4 * count * sizeof(float), 4);
 }
 
 /* texture coordinates with seams, from a ring to a coarser one that lies across its triangles */
@@ -104,11 +104,11 @@ static uint64_t transfer_corners(txm_env *env) {
     mesh.indices = coarse;
     mesh.face_count = triangles;
     golden_need(trimesh_transfer_corners(&input, &v, &mesh, sources, env, values), "corners", env);
-    uint64_t hash = tk_hash(0, values, 6 * triangles * sizeof(float));
+    uint64_t hash = golden_hash(0, values, 6 * triangles * sizeof(float), 4);
     golden_need(trimesh_split_corners(&mesh, values, 2, env, new_indices, corners, &count), "split",
                 env);
-    hash = tk_hash(hash, new_indices, 3 * triangles * sizeof *new_indices);
-    return tk_hash(hash, corners, count * sizeof *corners);
+    hash = golden_hash(hash, new_indices, 3 * triangles * sizeof *new_indices, 4);
+    return golden_hash(hash, corners, count * sizeof *corners, 4);
 }
 
 /* patches of an atlas chosen for all triangles */
@@ -120,7 +120,7 @@ static uint64_t textured(txm_env *env) {
     golden_ring(&surface, 0);
     const txm_mesh v = view();
     golden_need(trimesh_atlas_make(5, 100, -1, env, &atlas), "atlas", env);
-    hash = tk_hash(hash, &atlas, sizeof atlas);
+    hash = golden_hash(hash, &atlas, sizeof atlas, 4);
     trimesh_atlas_uv(&atlas, -1, atlas_uv);
     for (int repeat = 0; repeat < 2; repeat++) {
         memset(&choose, 0, sizeof choose);
@@ -128,12 +128,12 @@ static uint64_t textured(txm_env *env) {
         choose.repeat = repeat;
         choose.seed = 12;
         golden_need(trimesh_choose(&v, &choose, env, numbers, more_numbers), "choose", env);
-        hash = tk_hash(hash, numbers, v.face_count * sizeof *numbers);
-        hash = tk_hash(hash, more_numbers, v.face_count * sizeof *more_numbers);
+        hash = golden_hash(hash, numbers, v.face_count * sizeof *numbers, 4);
+        hash = golden_hash(hash, more_numbers, v.face_count * sizeof *more_numbers, 4);
         golden_need(
             trimesh_place_tiles(v.face_count, numbers, more_numbers, atlas_uv, 5, env, values),
             "place", env);
-        hash = tk_hash(hash, values, 6 * v.face_count * sizeof *values);
+        hash = golden_hash(hash, values, 6 * v.face_count * sizeof *values, 4);
     }
     return hash;
 }
@@ -144,13 +144,13 @@ static uint64_t colors(txm_env *env) {
     golden_ring(&surface, 0);
     const txm_mesh v = view();
     golden_need(trimesh_edge_colors(&v, 3, 8, env, numbers, more_numbers), "edge colours", env);
-    hash = tk_hash(hash, numbers, 3 * v.face_count * sizeof *numbers);
-    hash = tk_hash(hash, more_numbers, 3 * v.face_count * sizeof *more_numbers);
+    hash = golden_hash(hash, numbers, 3 * v.face_count * sizeof *numbers, 4);
+    hash = golden_hash(hash, more_numbers, 3 * v.face_count * sizeof *more_numbers, 4);
     golden_need(trimesh_random_colors(v.vertex_count, 0, 8, env, numbers), "random colours", env);
-    hash = tk_hash(hash, numbers, v.vertex_count * sizeof *numbers);
+    hash = golden_hash(hash, numbers, v.vertex_count * sizeof *numbers, 4);
     golden_need(trimesh_proper_colors(&v, env, numbers, &count), "proper colours", env);
-    hash = tk_hash(hash, numbers, v.vertex_count * sizeof *numbers);
-    return tk_hash(hash, &count, sizeof count);
+    hash = golden_hash(hash, numbers, v.vertex_count * sizeof *numbers, 4);
+    return golden_hash(hash, &count, sizeof count, 4);
 }
 
 static uint64_t patches(txm_env *env) {
@@ -165,14 +165,14 @@ static uint64_t patches(txm_env *env) {
         desc.iterations = k == 2 ? 20 : 0;
         desc.seed = (uint64_t)k;
         golden_need(trimesh_reference_patch(&desc, env, points, 600, &count), "patch", env);
-        hash = tk_hash(hash, points, count * sizeof *points);
+        hash = golden_hash(hash, points, count * sizeof *points, 4);
         for (size_t i = 0; i < count / 2; i++) {
             const trimesh_point p = points[i];
             points[i] = points[count - 1 - i];
             points[count - 1 - i] = p;
         }
         golden_need(trimesh_order_patch(points, count, env), "order", env);
-        hash = tk_hash(hash, points, count * sizeof *points);
+        hash = golden_hash(hash, points, count * sizeof *points, 4);
     }
     return hash;
 }
@@ -182,11 +182,11 @@ static uint64_t scatter_hash(const trimesh_scatter_desc *desc, txm_env *env, uin
     static const float corner[3] = {0.5f, -0.25f, 1};
     size_t count = 0;
     golden_need(trimesh_scatter(desc, env, things, THINGS, &count), "scatter", env);
-    hash = tk_hash(hash, things, count * sizeof *things);
+    hash = golden_hash(hash, things, count * sizeof *things, 4);
     for (size_t i = 0; i < count; i += 17) {
         float at[3];
         trimesh_instance_apply(&things[i], corner, at);
-        hash = tk_hash(hash, at, sizeof at);
+        hash = golden_hash(hash, at, sizeof at, 4);
     }
     return hash;
 }

@@ -21,10 +21,10 @@ static trimesh_desc describe(size_t vertices, trimesh_method method) {
 }
 
 static uint64_t mesh_hash(const trimesh_mesh *mesh, uint64_t hash) {
-    hash = tk_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float));
-    hash = tk_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float));
-    hash = tk_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t));
-    hash = tk_hash(hash, mesh->sources, mesh->vertex_count * sizeof(txm_mesh_place));
+    hash = golden_hash(hash, mesh->positions, 3 * mesh->vertex_count * sizeof(float), 4);
+    hash = golden_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float), 4);
+    hash = golden_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t), 4);
+    hash = golden_hash(hash, mesh->sources, mesh->vertex_count * sizeof(txm_mesh_place), 4);
     return tk_hash(hash, mesh->kinds, mesh->vertex_count);
 }
 
@@ -33,7 +33,7 @@ static uint64_t report_hash(const trimesh_report *r, uint64_t hash) {
                                   r->degenerate, r->duplicate, r->fins,           r->turned,
                                   r->split,      r->components, r->loops,
                                   (uint64_t)(r->euler + 1000), r->crease_edges};
-    return tk_hash(hash, numbers, sizeof numbers);
+    return golden_hash(hash, numbers, sizeof numbers, 8);
 }
 
 static uint64_t retile(trimesh_desc *desc, txm_env *env) {
@@ -135,7 +135,7 @@ static uint64_t updated(txm_env *env) {
     update.desc.report = &report;
     golden_need(trimesh_update(old, &update, env, &mesh), "update", env);
     uint64_t hash = report_hash(&report, mesh_hash(mesh, 0));
-    hash = tk_hash(hash, mesh->old_vertices, mesh->vertex_count * sizeof *mesh->old_vertices);
+    hash = golden_hash(hash, mesh->old_vertices, mesh->vertex_count * sizeof *mesh->old_vertices, 4);
     trimesh_mesh_free(mesh);
     trimesh_mesh_free(old);
     return hash;
