@@ -55,8 +55,8 @@
      Coordinates are synthesised, not colours [5]: each pixel of the output refers to a pixel of the
      exemplar. First pass [1, 3.4; 3], at the coarsest level of a pyramid: patches of N x N pixels,
      N / 2 apart, in scan order, each the best match of all positions, joined along minimum-error
-     cuts. Positions off the exemplar's lattice, which is found in its autocorrelation, cost more,
-     and so do those that were used more often than others. Second pass [1, 3.5; 2], coarse to fine:
+     cuts. Positions off the exemplar's lattice, which is found in its autocorrelation, cost more
+     (in courses of bricks and planks each course has its own phase), and so do those that were used more often than others. Second pass [1, 3.5; 2], coarse to fine:
      neighbourhoods of 16, then 8 pixels search for their best match among what their pixels already
      show, at random positions [4] and one lattice step away. Each pixel takes, of the candidates of
      all neighbourhoods that cover it, the one nearest to their mean with the adaptive weights
@@ -257,7 +257,9 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
 /* Release a job; NULL is allowed. */
 TEXPATCH_API void texpatch_free(texpatch_job *job);
 
-/* The lattice that a job keeps: x, y of both steps in pixels of the exemplar; 0: it has none. */
+/* The lattice that a job keeps: x, y of both steps in pixels of the exemplar; 0: it has none. Where each
+   course of bricks or planks begins somewhere else the first step is along the courses, from one brick to
+   the next, and the second across; the first is 0, 0 if planks have any length. */
 TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]);
 
 /* ---- straightening a photograph ---------------------------------------------------------- */
@@ -374,6 +376,7 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane);
 #include "texpatch/config.h"
 #include "texpatch/canvas.h"
 #include "texpatch/lattice.h"
+#include "texpatch/courses.h"
 #include "texpatch/sheets.h"
 #include "texpatch/check.h"
 #include "texpatch/quilt.h"

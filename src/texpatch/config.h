@@ -57,10 +57,21 @@ typedef struct txp_stack {
     double inverse[4]; /* lattice coordinates of (x, y): i0 x + i1 y, i2 x + i3 y              */
 } txp_stack;
 
+/* Where bricks begin in the courses of an exemplar; course i is where the second lattice coordinate
+   is origin + i to origin + i + 1. Those of the canvas repeat some of them in order. */
+typedef struct txp_courses {
+    int count;  /* 0: there are none, the lattice is all                                            */
+    int around; /* the canvas closes after so many; 0: it does not                                  */
+    int first, cycle; /* what is repeated                                                           */
+    double origin;
+    float *phase; /* in steps along the course, 0 to 1                                              */
+} txp_courses;
+
 /* What all jobs on the same exemplars share. */
 typedef struct txp_source {
     int sheets, levels, bytes, guide_at, guide_bytes;
     int has_lattice, is_random; /* is_random: no long-range order at all                        */
+    txp_courses courses;        /* where the lattice holds for each course alone                */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
     int has_alpha;
     int16_t alpha_at[TEXPATCH_MAX_CHANNELS]; /* of a compared byte that is a colour: the byte of its

@@ -139,6 +139,11 @@ static void txp_reduce_basis(double a[2], double b[2]) {
     }
 }
 
+/* Does what has this lattice repeat across its courses only? */
+static inline int txp_is_free(const double v[4]) {
+    return v[0] == 0 && v[1] == 0;
+}
+
 static double txp_det(const double *a, const double *b) {
     return a[0] * b[1] - a[1] * b[0];
 }
@@ -228,9 +233,17 @@ static int txp_lattice_find(const txp_correlation *k, double out[4], double *str
     return 1;
 }
 
-/* Set the lattice of a level of the stack; v: its steps, in pixels of level 0. */
+/* Set the lattice of a level of the stack; v: its steps, in pixels of level 0. If the first is 0 all
+   places along the courses are as good. */
 static void txp_lattice_set(txp_stack *k, const double v[4], double scale) {
     for (int i = 0; i < 4; i++) k->lattice[i] = v[i] * scale;
+    if (txp_is_free(v)) {
+        const double square = k->lattice[2] * k->lattice[2] + k->lattice[3] * k->lattice[3];
+        k->inverse[0] = k->inverse[1] = 0;
+        k->inverse[2] = k->lattice[2] / square;
+        k->inverse[3] = k->lattice[3] / square;
+        return;
+    }
     const double det = k->lattice[0] * k->lattice[3] - k->lattice[1] * k->lattice[2];
     k->inverse[0] = k->lattice[3] / det;
     k->inverse[1] = -k->lattice[2] / det;

@@ -70,8 +70,10 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
     if (s->has_lattice) { /* less whole steps of the lattice */
         const double *i = s->stack[0].inverse, *l = s->stack[0].lattice;
         const double u = i[0] * sx + i[1] * sy, v = i[2] * sx + i[3] * sy;
-        sx = l[0] * (u - floor(u)) + l[2] * (v - floor(v));
-        sy = l[1] * (u - floor(u)) + l[3] * (v - floor(v));
+        const int courses = s->courses.count ? s->courses.cycle : 1;
+        const double part = v - courses * floor(v / courses);
+        sx = l[0] * (u - floor(u)) + l[2] * part;
+        sy = l[1] * (u - floor(u)) + l[3] * part;
     }
     job->shift_x = sx;
     job->shift_y = sy;

@@ -2,7 +2,7 @@
 #define TEXPATCH_QUILT_H
 
 #include "canvas.h"
-#include "lattice.h"
+#include "courses.h"
 
 /* ---- first pass: patches and cuts -------------------------------------------------------- */
 
@@ -119,6 +119,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
     const int size = q->block, bytes = size * s->bytes;
     int span[4 * TXP_BLOCK][2], count = 0;
     uint32_t known = 0;
+    const txp_goal goal = txp_goal_make(k, &s->courses, bx + q->shift_x, by + q->shift_y, size);
     txp_use_integrate(&q->use);
     const uint8_t *a = txp_canvas_at(s, c, bx, by), *m = q->known + (a - c->pixels);
     for (int y = 0; y < size; y++) {
@@ -146,7 +147,7 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 const int x = i, y = k->first[n] + j;
                 double extra = 0;
                 if (s->has_lattice) {
-                    const double d = txp_off_lattice(k, x - bx - q->shift_x, y - by - q->shift_y);
+                    const double d = txp_off_bond(k, &s->courses, &goal, x, y);
                     if (d > (double)TXP_OFF_LATTICE && strict) continue;
                     extra += q->lattice_weight * fmin(d, TXP_OFF_LATTICE);
                 }

@@ -32,6 +32,7 @@ typedef struct txp_search {
     const txp_pass *pass;
     const uint8_t *target;
     int x, y;
+    txp_goal goal;
     txp_place best;
     double cost;
     uint32_t sad;
@@ -80,7 +81,7 @@ static void txp_try(txp_search *f, int x, int y) {
     f->seen[f->seen_count++ % 16].y = (int16_t)y;
     double extra = 0;
     if (s->has_lattice) {
-        const double d = txp_off_lattice(p->stack, x - f->x - p->shift_x, y - f->y - p->shift_y);
+        const double d = txp_off_bond(p->stack, &s->courses, &f->goal, x, y);
         extra += p->lattice_weight * fmin(d, TXP_OFF_LATTICE);
     }
     extra += p->use_weight * txp_use_at(&p->use, x, y, size);
@@ -98,6 +99,13 @@ static void txp_try(txp_search *f, int x, int y) {
     f->best.y = (int16_t)y;
 }
 
+/* Try the place of the lattice that is nearest to a place. */
+static void txp_try_snapped(txp_search *f, int x, int y) {
+    const txp_pass *p = f->pass;
+    if (p->source->has_lattice) txp_snap(p->stack, &p->source->courses, &f->goal, &x, &y);
+    txp_try(f, x, y);
+}
+
 /* Try a random place of the sheet within radius of the best one so far. */
 static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     const txp_pass *p = f->pass;
@@ -110,13 +118,7 @@ static void txp_try_near(txp_search *f, txm_rng *rng, int radius) {
     if (y1 > k->first[n] + k->high[n] - p->size) y1 = k->first[n] + k->high[n] - p->size;
     int x = txm_rng_range(rng, x0, x1 > x0 ? x1 : x0);
     int y = txm_rng_range(rng, y0, y1 > y0 ? y1 : y0);
-    if (p->source->has_lattice) { /* snap to the lattice */
-        double dx, dy;
-        txp_from_lattice(k, x - f->x - p->shift_x, y - f->y - p->shift_y, &dx, &dy);
-        x -= (int)floor(dx + 0.5);
-        y -= (int)floor(dy + 0.5);
-    }
-    txp_try(f, x, y);
+    txp_try_snapped(f, x, y);
 }
 
 /* Try the pieces that pixels of the window come from now. */
@@ -143,6 +145,7 @@ static void txp_match(txp_pass *p, int i, int j) {
     f.pass = p;
     f.x = p->xs[i];
     f.y = p->ys[j];
+    f.goal = txp_goal_make(k, &s->courses, f.x + p->shift_x, f.y + p->shift_y, size);
     f.target = txp_canvas_at(s, c, f.x, f.y);
     f.cost = 1e30;
     f.sad = UINT32_MAX;
@@ -184,7 +187,9 @@ static void txp_match(txp_pass *p, int i, int j) {
                                                {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
                 const double x = k->lattice[0] * jump[d][0] + k->lattice[2] * jump[d][1];
                 const double y = k->lattice[1] * jump[d][0] + k->lattice[3] * jump[d][1];
-                txp_try(&f, f.best.x + (int)floor(x + 0.5), f.best.y + (int)floor(y + 0.5));
+                const int to_x = f.best.x + (int)floor(x + 0.5), to_y = f.best.y + (int)floor(y + 0.5);
+                if (s->courses.count) txp_try_snapped(&f, to_x, to_y);
+                else txp_try(&f, to_x, to_y);
             }
         }
     }

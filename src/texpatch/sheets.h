@@ -2,7 +2,7 @@
 #define TEXPATCH_SHEETS_H
 
 #include "canvas.h"
-#include "lattice.h"
+#include "courses.h"
 
 /* ---- the stack of sheets ------------------------------------------------------------------ */
 
@@ -419,12 +419,15 @@ enum { TXP_LATTICE_SIDE = 300 }; /* pixels: of a larger coarsest level only the 
                                    time grows with the fourth power of this. It is larger only if the
                                    output is so small that no longer lattice fits                 */
 
-/* Find the lattice at the coarsest level, unless the caller gives it, and set it for all levels. */
-static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env *env) {
+/* Find the lattice at the coarsest level, unless the caller gives it, and set it for all levels; memory
+   receives the phases of courses. */
+static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_arena *memory,
+                                     txm_env *env) {
     txm_arena scratch;
     txp_correlation k;
     double v[4] = {0, 0, 0, 0}, strongest = 0;
     s->has_lattice = s->is_random = 0;
+    memset(&s->courses, 0, sizeof s->courses);
     if (u->lattice == 1) {
         memcpy(v, u->lattice_vectors, sizeof v);
         s->has_lattice = 1;
@@ -450,16 +453,18 @@ static txm_status txp_lattice_search(const txp_setup *u, txp_source *s, txm_env 
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
         }
         for (int y = 0; y < k.height; y++) {
-            for (int x = 0; x < k.width; x++) {
-                const uint8_t *p = txp_stack_at(s, t, left + x, upper + y);
-                int sum = p[0], n = 1; /* one map at least has a weight */
-                for (; n < s->guide_at && n < 3; n++) sum += p[n];
-                gray[y * k.width + x] = (int16_t)(sum / n - 128);
-            }
+            for (int x = 0; x < k.width; x++)
+                gray[y * k.width + x] =
+                    (int16_t)txp_gray_of(s, txp_stack_at(s, t, left + x, upper + y));
         }
         k.gray = gray;
         txm_parallel_for(env, k.reach_y + 1, txp_correlate_row, &k);
-        const int found = txp_lattice_find(&k, v, &strongest);
+        int found = txp_lattice_find(&k, v, &strongest);
+        if (u->lattice == 0 &&
+            !txp_courses_find(s, &k, top, v, &found, &s->courses, memory, &scratch)) {
+            txm_arena_free(&scratch);
+            return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+        }
         s->has_lattice = found && u->lattice != -1;
         s->is_random = !found && strongest < TXP_RANDOM;
         for (int i = 0; i < 4; i++) v[i] *= 1 << top;
@@ -505,6 +510,27 @@ static int txp_lattice_fit(const double lattice[4], int tileable, double width, 
     return fabs(txp_det(out, out + 2)) > 0.5 * fabs(det);
 }
 
+/* Close the bond of a canvas across its ends. Of a sheet that is not the exemplar itself the lattice
+   counts from elsewhere; v: of the exemplar. 0: the torus is too small for it. */
+static int txp_courses_close(const txp_setup *u, txp_source *s, const double v[4]) {
+    const txp_sheet *k = &s->sheet[0];
+    const double *i = s->stack[0].inverse;
+    int around = 0;
+    for (int d = 0; d < 2; d++) {
+        if (!(u->tileable & (d ? TEXPATCH_TILE_Y : TEXPATCH_TILE_X))) continue;
+        int n = abs((int)floor((d ? i[3] * u->height : i[2] * u->width) + 0.5));
+        while (n) { /* the greatest common divisor */
+            const int rest = around % n;
+            around = n;
+            n = rest;
+        }
+    }
+    s->courses.origin -= (v[0] * k->y0 - v[1] * k->x0) / txp_det(v, v + 2);
+    if (around == 1) return 0;
+    txp_courses_cycle(&s->courses, around);
+    return 1;
+}
+
 /* Sheets, stacks and lattice. If the output is a torus and the exemplar has a lattice, its sheet is
    stretched until whole steps of the lattice fit the sides.
    s       as the checks leave it; overwritten
@@ -514,15 +540,25 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source 
     int least = INT_MAX;
     if (u->tileable & TEXPATCH_TILE_X) least = u->width;
     if (u->tileable & TEXPATCH_TILE_Y && u->height < least) least = u->height;
-    txm_arena first;
+    txm_arena first, bond;
     double closed[4], stretch[4], det;
-    const double *v = s->stack[0].lattice;
+    double v[4];
+    int is_free;
     txm_arena_init(&first, env);
+    txm_arena_init(&bond, env);
     txp_sheets(u, s, NULL);
     txp_source_sizes(s, least);
     txm_status status = txp_stacks(u, s, &first, env);
-    if (status == TXM_OK) status = txp_lattice_search(u, s, env);
+    if (status == TXM_OK) status = txp_lattice_search(u, s, &bond, env);
+    memcpy(v, s->stack[0].lattice, sizeof v);
     if (status != TXM_OK || !s->has_lattice || !u->tileable || s->sheets > 1) goto done;
+    is_free = txp_is_free(v);
+    if (is_free) { /* once along the output, whatever its length */
+        const int is_upright = fabs(v[2]) > fabs(v[3]);
+        const double length = (is_upright ? u->height / v[2] : u->width / v[3]);
+        v[0] = length * v[3];
+        v[1] = -length * v[2];
+    }
     if (!txp_lattice_fit(v, u->tileable, u->width, u->height, closed)) {
         s->has_lattice = 0; /* the torus is too small for it */
         goto done;
@@ -537,9 +573,20 @@ static txm_status txp_source_make(const txp_setup *u, txp_source *s, txp_source 
     txp_sheets(u, s, stretch);
     txp_source_sizes(s, least);
     status = txp_stacks(u, s, &first, env);
+    if (is_free) closed[0] = closed[1] = 0;
     for (int l = 0; l < s->levels && status == TXM_OK; l++)
         txp_lattice_set(&s->stack[l], closed, 1.0 / (1 << l));
+    if (s->courses.count && !txp_courses_close(u, s, v)) s->has_lattice = 0;
 done:
+    if (!s->has_lattice) s->courses.count = 0;
+    if (status == TXM_OK && s->courses.count) {
+        const float *phase = s->courses.phase;
+        const size_t count = (size_t)s->courses.count;
+        s->courses.phase = (float *)txm_arena_alloc(&first, count, sizeof *phase);
+        if (s->courses.phase) memcpy(s->courses.phase, phase, count * sizeof *phase);
+        else status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the lattice");
+    }
+    txm_arena_free(&bond);
     if (status == TXM_OK) {
         txp_find_contrast(s);
         *out = (txp_source *)txm_arena_alloc(&first, 1, sizeof **out);
