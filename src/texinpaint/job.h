@@ -230,10 +230,10 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
         txi_choice_free(&job->choice);
         txm_arena_free(&job->of_window);
         status = txi_gutter(&job->domain, &job->of_window, &stage.env, &filled);
+        if (status == TXM_OK) job->info.written += filled; /* a second try fills no more */
         if (status == TXM_OK) status = txi_bleed(&job->domain, &stage.env);
         if (status != TXM_OK) break;
         txm_arena_free(&job->of_window);
-        job->info.written += filled;
         job->phase = TXI_DONE;
         break;
     default: break;

@@ -193,7 +193,7 @@ static txm_status txi_bleed(const txi_domain *d, txm_env *env) {
             if (!hole) status = txi_no_memory(env);
             else txm_mask_read(&d->desc->mask, TXM_MASK_REPLACES, hole);
         }
-        if (status == TXM_OK) status = txm_image_bleed_part(&d->maps[map], hole, 0, env);
+        if (status == TXM_OK) status = txm_image_bleed_part(&d->maps[map], hole, 0, 1, 1, env);
     }
     txm_arena_free(&arena);
     return status;

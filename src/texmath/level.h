@@ -181,9 +181,15 @@ static inline txm_status txm_image_halve(const txm_image *image, txm_content con
         if (i) code[i - 1] = txm_srgb_to_linear(((float)i - 0.5f) / 255.0f);
     }
     txm_parallel_for(env, to.height, txm_level_row, &h);
-    if (may_hide && txm_image_has_hidden(&to)) txm_bleed_run(&bleed, env);
+    if (may_hide && txm_image_has_hidden(&to)) {
+        txm_env quiet; /* half is complete or untouched: it cannot be cancelled */
+        memset(&quiet, 0, sizeof quiet);
+        if (env) quiet = *env;
+        quiet.progress = NULL;
+        status = txm_bleed_run(&bleed, &quiet);
+    }
     txm_arena_free(&arena);
-    return TXM_OK;
+    return status;
 }
 
 /* ---- cutouts ---------------------------------------------------------------------------- */
