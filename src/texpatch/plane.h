@@ -286,6 +286,37 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
     txm_arena_free(&plane->memory); /* the plane lies in it */
 }
 
+/* Draw a part of a map of a finished cell. What is hidden in it is bled from the whole canvas of the
+   cell, so that all windows show the same.
+   d     the map, with the part's place on the canvas
+   to    the part, in the window                                                              */
+static txm_status txp_plane_draw_map(const txp_draw *d, const txm_image *to, txm_env *env) {
+    const texpatch_job *job = d->job;
+    txp_draw part = *d, all = *d;
+    txm_arena scratch;
+    part.out = *to;
+    txm_status status = txp_draw_rows(&part, 1, env);
+    if (status != TXM_OK || !d->has_alpha || job->setup.kinds[d->map].is_label ||
+        !txm_image_has_hidden(to))
+        return status;
+    txm_arena_init(&scratch, env);
+    const size_t pixel = (size_t)to->channels * txm_sample_bytes(to->sample);
+    all.x = all.y = 0;
+    all.out.width = job->width;
+    all.out.height = job->height;
+    all.out.stride = (ptrdiff_t)((size_t)job->width * pixel);
+    all.out.pixels = txm_arena_alloc(&scratch, (size_t)job->height, (size_t)job->width * pixel);
+    if (!all.out.pixels) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a cell of the plane");
+    if (status == TXM_OK) status = txp_draw_rows(&all, 1, env);
+    if (status == TXM_OK) status = txm_image_bleed(&all.out, 0, env);
+    for (int y = 0; y < to->height && status == TXM_OK; y++)
+        memcpy(txm_image_row(to, y),
+               (const char *)txm_image_row_const(&all.out, d->y + y) + (size_t)d->x * pixel,
+               (size_t)to->width * pixel);
+    txm_arena_free(&scratch);
+    return status;
+}
+
 /* Draw the part of a window on a finished cell, whose pixel (0, 0) is at (cx, cy) of the window. */
 static txm_status txp_plane_draw_cell(const texpatch_job *job, int half, int cell, int64_t cx,
                                       int64_t cy, int width, int height, const txm_image *out,
@@ -305,7 +336,7 @@ static txm_status txp_plane_draw_cell(const texpatch_job *job, int half, int cel
         d.job = job;
         d.x = sx;
         d.y = sy;
-        if (status == TXM_OK) status = txp_draw_rows(&d, 1, env);
+        if (status == TXM_OK) status = txp_plane_draw_map(&d, &to, env);
         if (status != TXM_OK) return status;
     }
     for (int y = y0; y < y1 && sources; y++) {

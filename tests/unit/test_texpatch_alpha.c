@@ -144,6 +144,34 @@ static void test_hidden_everywhere(void **state) {
     }
 }
 
+/* Windows of a plane agree in what is hidden, too, and it continues what shows in the plane. */
+static void test_plane_windows(void **state) {
+    (void)state;
+    const txm_image cutout = draw_cutout(SIDE, 4, 0, 2);
+    const texpatch_exemplar exemplar = exemplar_of(&cutout);
+    const texpatch_desc desc = desc_of(&exemplar, 1, 1, 0, 0);
+    const txm_image a = new_image(70, 60, 4, TXM_U8), b = new_image(50, 64, 4, TXM_U8);
+    texpatch_plane *plane;
+    assert_int_equal(texpatch_plane_make(&desc, NULL, &plane), TXM_OK);
+    assert_int_equal(texpatch_plane_draw(plane, -40, 90, NULL, &a, NULL), TXM_OK);
+    assert_int_equal(texpatch_plane_draw(plane, -20, 100, NULL, &b, NULL), TXM_OK);
+    texpatch_plane_free(plane);
+    check_colours(&a);
+    double apart = 0;
+    int count = 0;
+    for (int y = 0; y < 50; y++) {
+        for (int x = 0; x < 50; x++) {
+            assert_true(is_pixel(&a, x + 20, y + 10, &b, x, y));
+            /* hidden pixels are as visible ones beside them, but for the grain */
+            if (!x || txm_image_get(&b, x, y, 3) > 0 || !(txm_image_get(&b, x - 1, y, 3) > 0)) continue;
+            apart += 255 * fabs((double)txm_image_get(&b, x, y, 0) - (double)txm_image_get(&b, x - 1, y, 0));
+            count++;
+        }
+    }
+    assert_true(count > 10);
+    assert_between("colours apart where visible ones end", apart / count, 0, 7);
+}
+
 /* A pixel that hardly shows hardly counts when pieces are compared. */
 static void test_faint(void **state) {
     (void)state;
@@ -202,6 +230,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_teardown(test_hidden, release_all),
         cmocka_unit_test_teardown(test_hidden_everywhere, release_all),
+        cmocka_unit_test_teardown(test_plane_windows, release_all),
         cmocka_unit_test_teardown(test_faint, release_all),
         cmocka_unit_test_teardown(test_data, release_all),
         cmocka_unit_test_teardown(test_samples, release_all),
