@@ -85,7 +85,7 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 60 bytes for each pixel of the output while it is made, and a copy of each map that
+     RGB: some 70 bytes for each pixel of the output while it is made, and a copy of each map that
      has transparent pixels; some 6 for each pixel of the
      exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
      bytes for each pixel along the upper and lower sides of a row of cells.
@@ -142,8 +142,7 @@ enum {
     TEXPATCH_MAX_EXEMPLARS = 8,
     TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
     TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
-    TEXPATCH_MAX_SIDE = 16384   /* of an exemplar; the sum of their heights (with turns: of
-                                   their larger sides, times turns) may be 32767             */
+    TEXPATCH_MAX_SIDE = 16384   /* of an exemplar                                            */
 };
 
 /* How one of the maps is treated; all zero: a picture that follows the others. */
@@ -352,7 +351,8 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
                                             texpatch_plane **out);
 
 /* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
-   map_count pictures of one size. sources may be NULL, or width * height of them.
+   map_count pictures of one size. Hidden colours continue what shows around them in the plane, so that
+   windows agree in them, too. sources may be NULL, or width * height of them.
    cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
           of whole cells are cheapest                                                          */
 TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,

@@ -90,7 +90,7 @@ static txm_status txp_show_all(txp_setup *u, txm_arena *memory, txm_env *env) {
 static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
                                       txm_env *env) {
     txm_status status = TXM_OK;
-    int bytes = 0, rows = 0;
+    int bytes = 0;
     memset(u, 0, sizeof *u);
     memset(s, 0, sizeof *s);
     if (!d->exemplars || d->exemplar_count < 1 || d->exemplar_count > TEXPATCH_MAX_EXEMPLARS)
@@ -161,7 +161,6 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
             return txm_fail(env, TXM_TOO_SMALL, "an exemplar must be 32 x 32 pixels or more");
         if (w > TEXPATCH_MAX_SIDE || h > TEXPATCH_MAX_SIDE)
             return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 16384 x 16384 pixels at most");
-        rows += (u->turns > 2 ? (w > h ? w : h) : h) * u->turns * (u->mirror ? 2 : 1);
         if ((x->guide.pixels != NULL) != (d->exemplars[0].guide.pixels != NULL))
             return txm_fail(env, TXM_BAD_ARGUMENT, "give all exemplars a guide, or none");
         if (x->guide.pixels) {
@@ -189,10 +188,6 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         return txm_fail(env, TXM_TOO_LARGE,
                         "maps with a weight and the guide may have 16 channels "
                         "together; give some maps weight 0");
-    if (rows > INT16_MAX)
-        return txm_fail(env, TXM_TOO_LARGE,
-                        "the exemplars are too high together (32767 rows, each "
-                        "turned form counted)");
     u->most_weight = s->guide_bytes ? u->guide_weight : 0;
     for (int m = 0; m < u->map_count; m++)
         u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);

@@ -33,7 +33,7 @@ enum {
 
 /* A pixel of the stack of sheets; x = -1: none, the pixel of the canvas is the caller's. */
 typedef struct txp_place {
-    int16_t x, y;
+    int32_t x, y;
 } txp_place;
 
 /* One exemplar in one orientation: rows first .. first + height - 1 of the stack. Its pixel (x, y)

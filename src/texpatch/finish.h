@@ -245,8 +245,8 @@ static void txp_measure_band(void *context, int lane) {
                     *bend = *tone = TXP_PULL_SEAM;
                     continue;
                 }
-                a.x = (int16_t)(a.x + !d);
-                a.y = (int16_t)(a.y + d);
+                a.x += !d;
+                a.y += d;
                 if (a.x == q.x && a.y == q.y) continue;
                 if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
                 *tone = TXP_PULL_SEAM;
@@ -254,8 +254,8 @@ static void txp_measure_band(void *context, int lane) {
                           by = q.y + shift[1] - 2;
                 int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
                 if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    const txp_place from_a = {(int16_t)ax, (int16_t)ay};
-                    const txp_place from_b = {(int16_t)bx, (int16_t)by};
+                    const txp_place from_a = {ax, ay};
+                    const txp_place from_b = {bx, by};
                     txp_seam_step(s, k, from_a, from_b, sum);
                     for (int b = 0; b < s->guide_at; b++)
                         most = abs(sum[b]) > most ? abs(sum[b]) : most;

@@ -136,8 +136,8 @@ static inline txp_place txp_refine_place(const txp_source *s, int level, txp_pla
     const int n = s->sheets > 1 && p.x >= 0 ? c->sheet[p.y] : 0;
     txp_place q = p;
     if (p.x < 0) return q;
-    q.x = (int16_t)(2 * p.x + px);
-    q.y = (int16_t)(f->first[n] + 2 * (p.y - c->first[n]) + py);
+    q.x = 2 * p.x + px;
+    q.y = f->first[n] + 2 * (p.y - c->first[n]) + py;
     return q;
 }
 
@@ -197,10 +197,9 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
                     const int sheet = s->sheets > 1 && p.x >= 0 ? s->stack[0].sheet[p.y] : 0;
                     if (p.x >= 0) {
                         const txp_stack *t = &s->stack[level];
-                        p.x = (int16_t)txm_clampi(p.x >> level, 0, t->wide[sheet] - 1);
-                        p.y = (int16_t)(t->first[sheet] +
-                                        txm_clampi((p.y - s->stack[0].first[sheet]) >> level, 0,
-                                                   t->high[sheet] - 1));
+                        p.x = txm_clampi(p.x >> level, 0, t->wide[sheet] - 1);
+                        p.y = t->first[sheet] + txm_clampi((p.y - s->stack[0].first[sheet]) >> level,
+                                                           0, t->high[sheet] - 1);
                     }
                     c->at[i] = p;
                 }

@@ -175,8 +175,8 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 }
                 if (count < TXP_CANDIDATES) {
                     q->near_costs[count] = txm_float(cost);
-                    q->near_places[count].x = (int16_t)x;
-                    q->near_places[count++].y = (int16_t)y;
+                    q->near_places[count].x = x;
+                    q->near_places[count++].y = y;
                 }
             }
         }
@@ -226,8 +226,8 @@ static void txp_quilt_lay(txp_quilt *q, int bx, int by, txp_place at) {
                                (is_cut[3] && y - (size - o) > cut[3][x])))
                 continue;
             txp_place p;
-            p.x = (int16_t)(at.x + x);
-            p.y = (int16_t)(at.y + y);
+            p.x = at.x + x;
+            p.y = at.y + y;
             uint32_t *use = q->use.count + p.y / TXP_CELL * q->use.columns + p.x / TXP_CELL;
             if (q->done[i]) {
                 const txp_place old = c->at[i];

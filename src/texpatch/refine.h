@@ -55,8 +55,8 @@ static void txp_find_surroundings(txp_search *f) {
         f->around[n].x = f->around[n].y = -1;
         if (cx >= 0 && cy >= 0 && cx < c->width && cy < c->height) {
             const txp_place at = c->at[txp_index(c, cx, cy)];
-            f->around[n].x = (int16_t)(at.x - dx);
-            f->around[n].y = (int16_t)(at.y - dy);
+            f->around[n].x = at.x - dx;
+            f->around[n].y = at.y - dy;
         }
         n++;
     }
@@ -77,8 +77,8 @@ static void txp_try(txp_search *f, int x, int y) {
     for (int i = 0; i < 16 && i < f->seen_count; i++) {
         if (f->seen[i].x == x && f->seen[i].y == y) return;
     }
-    f->seen[f->seen_count % 16].x = (int16_t)x;
-    f->seen[f->seen_count++ % 16].y = (int16_t)y;
+    f->seen[f->seen_count % 16].x = x;
+    f->seen[f->seen_count++ % 16].y = y;
     double extra = 0;
     if (s->has_lattice) {
         const double d = txp_off_bond(p->stack, &s->courses, &f->goal, x, y);
@@ -95,8 +95,8 @@ static void txp_try(txp_search *f, int x, int y) {
     if (sad + extra >= f->cost) return;
     f->cost = sad + extra;
     f->sad = sad;
-    f->best.x = (int16_t)x;
-    f->best.y = (int16_t)y;
+    f->best.x = x;
+    f->best.y = y;
 }
 
 /* Try the place of the lattice that is nearest to a place. */
@@ -346,15 +346,17 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
         int u = 0;
 #ifdef TXP_SSE2
         if (n == 4 && x0 + size <= c->width) {
-            const __m128i zero = _mm_setzero_si128(), four = _mm_set1_epi32(4);
+            const __m128i zero = _mm_setzero_si128(), four = _mm_set_epi32(0, 4, 0, 4);
             const uint8_t *mean = band->mean + (line + (size_t)x0) * 4;
             int32_t *nearest = band->nearest + line + (size_t)x0;
             txp_place *next = c->next + txp_index(c, x0, y), first[4];
             for (int i = 0; i < 4; i++) {
-                first[i].x = (int16_t)(m.x + i);
-                first[i].y = (int16_t)(m.y + v);
+                first[i].x = m.x + i;
+                first[i].y = m.y + v;
             }
+            /* two places in each */
             __m128i place = _mm_loadu_si128((const __m128i *)(const void *)first);
+            __m128i other = _mm_loadu_si128((const __m128i *)(const void *)(first + 2));
             for (; u < size; u += 4, mean += 16, in += 16, nearest += 4, next += 4) {
                 const __m128i a = _mm_loadu_si128((const __m128i *)(const void *)mean);
                 const __m128i b = _mm_loadu_si128((const __m128i *)(const void *)in);
@@ -369,12 +371,18 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
                     _mm_castsi128_ps(low), _mm_castsi128_ps(high), _MM_SHUFFLE(3, 1, 3, 1)));
                 const __m128i square = _mm_add_epi32(even, odd);
                 __m128i *o = (__m128i *)(void *)nearest, *at = (__m128i *)(void *)next;
+                __m128i *after = (__m128i *)(void *)(next + 2);
                 const __m128i best = _mm_loadu_si128(o), less = _mm_cmplt_epi32(square, best);
                 _mm_storeu_si128(
                     o, _mm_or_si128(_mm_and_si128(less, square), _mm_andnot_si128(less, best)));
-                _mm_storeu_si128(at, _mm_or_si128(_mm_and_si128(less, place),
-                                                  _mm_andnot_si128(less, _mm_loadu_si128(at))));
-                place = _mm_add_epi16(place, _mm_and_si128(four, _mm_set1_epi32(0xffff)));
+                const __m128i here = _mm_unpacklo_epi32(less, less);
+                const __m128i there = _mm_unpackhi_epi32(less, less);
+                _mm_storeu_si128(at, _mm_or_si128(_mm_and_si128(here, place),
+                                                  _mm_andnot_si128(here, _mm_loadu_si128(at))));
+                _mm_storeu_si128(after, _mm_or_si128(_mm_and_si128(there, other),
+                                                     _mm_andnot_si128(there, _mm_loadu_si128(after))));
+                place = _mm_add_epi32(place, four);
+                other = _mm_add_epi32(other, four);
             }
         }
 #endif
@@ -386,8 +394,8 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
             if (d >= band->nearest[line + (size_t)x]) continue;
             band->nearest[line + (size_t)x] = d;
             txp_place *at = c->next + txp_index(c, x, y);
-            at->x = (int16_t)(m.x + u);
-            at->y = (int16_t)(m.y + v);
+            at->x = m.x + u;
+            at->y = m.y + v;
         }
     }
 }
@@ -479,8 +487,8 @@ static void txp_polish_band(void *context, int index) {
                 if (qx < 0 || qy < 0 || qx >= c->width || qy >= c->height) continue;
                 txp_place at = c->at[txp_index(c, qx, qy)];
                 if (at.x < 0) continue;
-                at.x = (int16_t)(at.x - (d % 3 - 1));
-                at.y = (int16_t)(at.y - (d / 3 - 1));
+                at.x -= d % 3 - 1;
+                at.y -= d / 3 - 1;
                 int known = 0;
                 for (int t = 0; t < count && !known; t++)
                     known = tried[t].x == at.x && tried[t].y == at.y;
