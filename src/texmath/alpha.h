@@ -31,10 +31,7 @@ static inline int txm_image_has_hidden(const txm_image *image) {
     for (int y = 0; y < image->height; y++) {
         const void *row = txm_image_row_const(image, y);
         for (size_t i = n - 1; i < end; i += n) {
-            if (image->sample == TXM_F32   ? !(((const float *)row)[i] > 0)
-                : image->sample == TXM_U16 ? ((const uint16_t *)row)[i] == 0
-                                           : ((const uint8_t *)row)[i] == 0)
-                return 1;
+            if (!(txm_sample_code(row, image->sample, i) > 0)) return 1;
         }
     }
     return 0;
@@ -85,10 +82,7 @@ static inline void txm_mean_get(const txm_mean *m, float *pixel) {
 static inline void txm_image_pixel(const txm_image *image, int x, int y, float *pixel) {
     const void *row = txm_image_row_const(image, y);
     const size_t n = (size_t)image->channels, i = (size_t)x * n;
-    for (size_t c = 0; c < n; c++)
-        pixel[c] = image->sample == TXM_F32   ? ((const float *)row)[i + c]
-                   : image->sample == TXM_U16 ? (float)((const uint16_t *)row)[i + c] / 65535.0f
-                                              : (float)((const uint8_t *)row)[i + c] / 255.0f;
+    for (size_t c = 0; c < n; c++) pixel[c] = txm_sample_get(row, image->sample, i + c);
 }
 
 /* ---- kernel: hidden colour from the visible neighbours ---------------------------------- */

@@ -87,13 +87,23 @@ static inline const void *txm_image_row_const(const txm_image *image, int y) {
     return txm_image_row(image, y);
 }
 
-/* sample c of pixel (x, y), all inside; 8 bit: value / 255; 16 bit: value / 65535 */
+/* sample i of a row as it is stored: 0 to 255, 0 to 65535, or a float */
+static inline float txm_sample_code(const void *row, txm_sample sample, size_t i) {
+    if (sample == TXM_F32) return ((const float *)row)[i];
+    if (sample == TXM_U16) return (float)((const uint16_t *)row)[i];
+    return (float)((const uint8_t *)row)[i];
+}
+
+/* sample i of a row; 8 bit: value / 255; 16 bit: value / 65535 */
+static inline float txm_sample_get(const void *row, txm_sample sample, size_t i) {
+    const float code = txm_sample_code(row, sample, i);
+    return sample == TXM_F32 ? code : code / (sample == TXM_U16 ? 65535.0f : 255.0f);
+}
+
+/* sample c of pixel (x, y), all inside, as txm_sample_get gives it */
 static inline float txm_image_get(const txm_image *image, int x, int y, int c) {
-    const void *row = txm_image_row_const(image, y);
     const size_t i = (size_t)x * (size_t)(image->channels ? image->channels : 1) + (size_t)c;
-    if (image->sample == TXM_F32) return ((const float *)row)[i];
-    if (image->sample == TXM_U16) return (float)((const uint16_t *)row)[i] / 65535.0f;
-    return (float)((const uint8_t *)row)[i] / 255.0f;
+    return txm_sample_get(txm_image_row_const(image, y), image->sample, i);
 }
 
 /* Store a sample. 8 and 16 bit: clamped to 0..1 (NaN to 0), times 255 or 65535, rounded; float: as

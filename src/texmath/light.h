@@ -91,9 +91,8 @@ static inline double txm_light_get(const txm_image *image, const float *decoded,
                                    int c) {
     const void *row = txm_image_row_const(image, y);
     const size_t i = (size_t)x * (size_t)image->channels + (size_t)c;
-    if (image->sample == TXM_U8) return (double)decoded[((const uint8_t *)row)[i]];
-    if (image->sample == TXM_U16) return (double)decoded[((const uint16_t *)row)[i]];
-    return (double)((const float *)row)[i];
+    const float code = txm_sample_code(row, image->sample, i);
+    return (double)(decoded ? decoded[(int)code] : code);
 }
 
 /* The light of each code of 8 or 16 bits; NULL for float samples, or without memory. */
