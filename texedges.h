@@ -733,8 +733,9 @@ static txm_status txe_layers_find(const texedges_desc *desc, int levels, int is_
     float *gray = (float *)txm_arena_alloc(arena, count, sizeof(float));
     float *scratch = smooth > 0 ? (float *)txm_arena_alloc(arena, count, sizeof(float)) : NULL;
     txm_image shown; /* hidden colours are those of visible neighbours */
-    if (arena->failed || txm_image_bled(&desc->image, 0, arena, env, &shown) != TXM_OK)
-        return txe_no_memory(env);
+    if (arena->failed) return txe_no_memory(env);
+    const txm_status status = txm_image_bled(&desc->image, 0, arena, env, &shown);
+    if (status != TXM_OK) return status;
     txe_stage(bar, "layers", desc->least > 4 ? to / 2 : to, (double)count * (4 + 2 * smooth));
     const int good = txe_gray(&shown, gray, bar);
     if (good < 0)

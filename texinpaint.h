@@ -2247,7 +2247,7 @@ static txm_status txi_bleed(const txi_domain *d, txm_env *env) {
             if (!hole) status = txi_no_memory(env);
             else txm_mask_read(&d->desc->mask, TXM_MASK_REPLACES, hole);
         }
-        if (status == TXM_OK) status = txm_image_bleed_part(&d->maps[map], hole, 0, env);
+        if (status == TXM_OK) status = txm_image_bleed_part(&d->maps[map], hole, 0, 1, 1, env);
     }
     txm_arena_free(&arena);
     return status;
@@ -15298,10 +15298,10 @@ TEXINPAINT_API txm_status texinpaint_step(texinpaint_job *job, txm_env *env, int
         txi_choice_free(&job->choice);
         txm_arena_free(&job->of_window);
         status = txi_gutter(&job->domain, &job->of_window, &stage.env, &filled);
+        if (status == TXM_OK) job->info.written += filled; /* a second try fills no more */
         if (status == TXM_OK) status = txi_bleed(&job->domain, &stage.env);
         if (status != TXM_OK) break;
         txm_arena_free(&job->of_window);
-        job->info.written += filled;
         job->phase = TXI_DONE;
         break;
     default: break;

@@ -514,13 +514,23 @@ static inline const void *txm_image_row_const(const txm_image *image, int y) {
     return txm_image_row(image, y);
 }
 
-/* sample c of pixel (x, y), all inside; 8 bit: value / 255; 16 bit: value / 65535 */
+/* sample i of a row as it is stored: 0 to 255, 0 to 65535, or a float */
+static inline float txm_sample_code(const void *row, txm_sample sample, size_t i) {
+    if (sample == TXM_F32) return ((const float *)row)[i];
+    if (sample == TXM_U16) return (float)((const uint16_t *)row)[i];
+    return (float)((const uint8_t *)row)[i];
+}
+
+/* sample i of a row; 8 bit: value / 255; 16 bit: value / 65535 */
+static inline float txm_sample_get(const void *row, txm_sample sample, size_t i) {
+    const float code = txm_sample_code(row, sample, i);
+    return sample == TXM_F32 ? code : code / (sample == TXM_U16 ? 65535.0f : 255.0f);
+}
+
+/* sample c of pixel (x, y), all inside, as txm_sample_get gives it */
 static inline float txm_image_get(const txm_image *image, int x, int y, int c) {
-    const void *row = txm_image_row_const(image, y);
     const size_t i = (size_t)x * (size_t)(image->channels ? image->channels : 1) + (size_t)c;
-    if (image->sample == TXM_F32) return ((const float *)row)[i];
-    if (image->sample == TXM_U16) return (float)((const uint16_t *)row)[i] / 65535.0f;
-    return (float)((const uint8_t *)row)[i] / 255.0f;
+    return txm_sample_get(txm_image_row_const(image, y), image->sample, i);
 }
 
 /* Store a sample. 8 and 16 bit: clamped to 0..1 (NaN to 0), times 255 or 65535, rounded; float: as
@@ -890,10 +900,7 @@ static inline int txm_image_has_hidden(const txm_image *image) {
     for (int y = 0; y < image->height; y++) {
         const void *row = txm_image_row_const(image, y);
         for (size_t i = n - 1; i < end; i += n) {
-            if (image->sample == TXM_F32   ? !(((const float *)row)[i] > 0)
-                : image->sample == TXM_U16 ? ((const uint16_t *)row)[i] == 0
-                                           : ((const uint8_t *)row)[i] == 0)
-                return 1;
+            if (!(txm_sample_code(row, image->sample, i) > 0)) return 1;
         }
     }
     return 0;
@@ -944,17 +951,17 @@ static inline void txm_mean_get(const txm_mean *m, float *pixel) {
 static inline void txm_image_pixel(const txm_image *image, int x, int y, float *pixel) {
     const void *row = txm_image_row_const(image, y);
     const size_t n = (size_t)image->channels, i = (size_t)x * n;
-    for (size_t c = 0; c < n; c++)
-        pixel[c] = image->sample == TXM_F32   ? ((const float *)row)[i + c]
-                   : image->sample == TXM_U16 ? (float)((const uint16_t *)row)[i + c] / 65535.0f
-                                              : (float)((const uint8_t *)row)[i + c] / 255.0f;
+    for (size_t c = 0; c < n; c++) pixel[c] = txm_sample_get(row, image->sample, i + c);
 }
 
 /* ---- kernel: hidden colour from the visible neighbours ---------------------------------- */
 
 enum { TXM_WRAP_X = 1, TXM_WRAP_Y = 2 }; /* left meets right, top meets bottom                 */
 
-enum { TXM_BLEED_LEVELS = 32 }; /* an int has 31 bits                                          */
+enum {
+    TXM_BLEED_LEVELS = 32,     /* an int has 31 bits                                           */
+    TXM_BLEED_PIXELS = 1 << 20 /* between two reports of progress                              */
+};
 
 /* One level of the pyramid, lanes numbers a pixel: its colour, and how much that counts, 0..1. */
 typedef struct txm_bleed_level {
@@ -966,7 +973,9 @@ typedef struct txm_bleed {
     txm_image image;
     const uint8_t *part; /* NULL, or a byte for each pixel: 0 where its colour stays            */
     int wrap, lanes, levels;
-    int at; /* the level that is made now                                                       */
+    int at, is_up, first;  /* the level that is made now, which way, and from which row on       */
+    double done, pixels;   /* of all levels, both ways                                          */
+    float from, to;        /* what is reported at the beginning and at the end                  */
     txm_bleed_level level[TXM_BLEED_LEVELS]; /* 0: unused, it is the image                      */
 } txm_bleed;
 
@@ -1065,21 +1074,48 @@ static inline void txm_bleed_begin(txm_bleed *b, const txm_image *image, int wra
     b->image = *image;
     b->wrap = wrap;
     b->lanes = image->channels;
+    b->pixels = (double)width * height;
     do {
         txm_bleed_level *to = &b->level[++b->levels];
         to->width = width = width / 2 + width % 2;
         to->height = height = height / 2 + height % 2;
         to->pixels = (float *)txm_arena_alloc(arena, (size_t)width * (size_t)height,
                                               (size_t)b->lanes * sizeof(float));
+        b->pixels += 2.0 * width * height;
     } while (width > 1 || height > 1);
 }
 
-static inline void txm_bleed_run(txm_bleed *b, const txm_env *env) {
-    for (b->at = 1; b->at <= b->levels; b->at++)
-        txm_parallel_for(env, b->level[b->at].height, txm_bleed_pull, b);
-    for (b->at = b->levels - 1; b->at > 0; b->at--)
-        txm_parallel_for(env, b->level[b->at].height, txm_bleed_push, b);
-    txm_parallel_for(env, b->image.height, txm_bleed_push, b);
+static inline void txm_bleed_row(void *context, int row) {
+    const txm_bleed *b = (const txm_bleed *)context;
+    if (b->is_up) txm_bleed_pull(context, b->first + row);
+    else txm_bleed_push(context, b->first + row);
+}
+
+/* Make one level, some rows at a time. b->done counts rows of all levels, of b->rows. */
+static inline txm_status txm_bleed_level_run(txm_bleed *b, int level, int is_up, txm_env *env) {
+    const int width = level ? b->level[level].width : b->image.width;
+    const int height = level ? b->level[level].height : b->image.height;
+    const int some = TXM_BLEED_PIXELS / width + 1;
+    b->at = level;
+    b->is_up = is_up;
+    for (b->first = 0; b->first < height; b->first += some) {
+        const int rows = height - b->first < some ? height - b->first : some;
+        if (txm_progress(env, txm_lerpf(b->from, b->to, (float)(b->done / b->pixels)), "colours"))
+            return txm_fail(env, TXM_CANCELLED, "cancelled");
+        txm_parallel_for(env, rows, txm_bleed_row, b);
+        b->done += (double)rows * width;
+    }
+    return TXM_OK;
+}
+
+/* All levels. After a cancellation an unknown part of what is hidden is as it was. */
+static inline txm_status txm_bleed_run(txm_bleed *b, txm_env *env) {
+    txm_status status = TXM_OK;
+    for (int l = 1; l <= b->levels && status == TXM_OK; l++)
+        status = txm_bleed_level_run(b, l, 1, env);
+    for (int l = b->levels - 1; l >= 0 && status == TXM_OK; l--)
+        status = txm_bleed_level_run(b, l, 0, env);
+    return status;
 }
 
 /* Replace the colour of fully transparent pixels, where alpha is 0, by a smooth continuation of
@@ -1093,11 +1129,13 @@ static inline void txm_bleed_run(txm_bleed *b, const txm_env *env) {
            ones must be finite where they show
    part    NULL: everywhere; or width * height bytes, row after row: 0 where even hidden colours stay
    wrap    TXM_WRAP_X | TXM_WRAP_Y: the picture tiles that way
-   return  TXM_OK; TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY: image is untouched
+   from, to  progress is reported as a fraction in this range, 0..1, stage "colours"
+   return  TXM_OK; TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY: image is untouched;
+           TXM_CANCELLED: a part of the hidden colours is replaced
    cost    a look at alpha if nothing is hidden; else about 50 ns per pixel on one thread, and
            (channels) * 4 / 3 bytes per pixel                                              */
 static inline txm_status txm_image_bleed_part(const txm_image *image, const uint8_t *part, int wrap,
-                                              txm_env *env) {
+                                              float from, float to, txm_env *env) {
     txm_bleed b;
     txm_arena arena;
     txm_status status = txm_image_check(image, "image", 0, env);
@@ -1110,24 +1148,27 @@ static inline txm_status txm_image_bleed_part(const txm_image *image, const uint
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to continue visible colours");
     else {
         b.part = part;
-        txm_bleed_run(&b, env);
+        b.from = from;
+        b.to = to;
+        status = txm_bleed_run(&b, env);
     }
     txm_arena_free(&arena);
     return status;
 }
 
-/* The same, everywhere. */
+/* The same, everywhere, as the last thing that a call does: 1 is reported. */
 static inline txm_status txm_image_bleed(const txm_image *image, int wrap, txm_env *env) {
-    return txm_image_bleed_part(image, NULL, wrap, env);
+    return txm_image_bleed_part(image, NULL, wrap, 1, 1, env);
 }
 
 /* The image as it is if nothing is hidden in it, else a copy whose hidden colour is bled: what a
-   function that takes a picture should go on with, so that hidden colour cannot matter.
+   function that takes a picture should go on with, so that hidden colour cannot matter. It is the first
+   thing that a call does: 0 is reported.
 
    wrap    as above
    arena   receives the copy
    out     receives the image, resolved, or the copy, with packed rows; untouched after an error
-   return  TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY                      */
+   return  TXM_OK, TXM_BAD_ARGUMENT, TXM_TOO_LARGE, TXM_OUT_OF_MEMORY, TXM_CANCELLED       */
 static inline txm_status txm_image_bled(const txm_image *image, int wrap, txm_arena *arena,
                                         txm_env *env, txm_image *out) {
     txm_status status = txm_image_check(image, "image", 0, env);
@@ -1145,7 +1186,7 @@ static inline txm_status txm_image_bled(const txm_image *image, int wrap, txm_ar
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a copy of the picture");
     for (int y = 0; y < from.height; y++)
         memcpy(txm_image_row(&copy, y), txm_image_row_const(&from, y), row);
-    status = txm_image_bleed(&copy, wrap, env);
+    status = txm_image_bleed_part(&copy, NULL, wrap, 0, 0, env);
     if (status == TXM_OK) *out = copy;
     return status;
 }
@@ -1327,9 +1368,15 @@ static inline txm_status txm_image_halve(const txm_image *image, txm_content con
         if (i) code[i - 1] = txm_srgb_to_linear(((float)i - 0.5f) / 255.0f);
     }
     txm_parallel_for(env, to.height, txm_level_row, &h);
-    if (may_hide && txm_image_has_hidden(&to)) txm_bleed_run(&bleed, env);
+    if (may_hide && txm_image_has_hidden(&to)) {
+        txm_env quiet; /* half is complete or untouched: it cannot be cancelled */
+        memset(&quiet, 0, sizeof quiet);
+        if (env) quiet = *env;
+        quiet.progress = NULL;
+        status = txm_bleed_run(&bleed, &quiet);
+    }
     txm_arena_free(&arena);
-    return TXM_OK;
+    return status;
 }
 
 /* ---- cutouts ---------------------------------------------------------------------------- */
@@ -1500,9 +1547,8 @@ static inline double txm_light_get(const txm_image *image, const float *decoded,
                                    int c) {
     const void *row = txm_image_row_const(image, y);
     const size_t i = (size_t)x * (size_t)image->channels + (size_t)c;
-    if (image->sample == TXM_U8) return (double)decoded[((const uint8_t *)row)[i]];
-    if (image->sample == TXM_U16) return (double)decoded[((const uint16_t *)row)[i]];
-    return (double)((const float *)row)[i];
+    const float code = txm_sample_code(row, image->sample, i);
+    return (double)(decoded ? decoded[(int)code] : code);
 }
 
 /* The light of each code of 8 or 16 bits; NULL for float samples, or without memory. */

@@ -85,7 +85,7 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 60 bytes for each pixel of the output while it is made, and a copy of each map that
+     RGB: some 70 bytes for each pixel of the output while it is made, and a copy of each map that
      has transparent pixels; some 6 for each pixel of the
      exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
      bytes for each pixel along the upper and lower sides of a row of cells.
@@ -142,8 +142,7 @@ enum {
     TEXPATCH_MAX_EXEMPLARS = 8,
     TEXPATCH_MAX_CHANNELS = 16, /* of all maps with a weight, and the guide, together        */
     TEXPATCH_MIN_SIDE = 32,     /* pixels, of an exemplar                                    */
-    TEXPATCH_MAX_SIDE = 16384   /* of an exemplar; the sum of their heights (with turns: of
-                                   their larger sides, times turns) may be 32767             */
+    TEXPATCH_MAX_SIDE = 16384   /* of an exemplar                                            */
 };
 
 /* How one of the maps is treated; all zero: a picture that follows the others. */
@@ -352,7 +351,8 @@ TEXPATCH_API txm_status texpatch_plane_make(const texpatch_desc *desc, txm_env *
                                             texpatch_plane **out);
 
 /* Draw the window whose top left pixel is (x, y), |x|, |y| <= 2^40, for all maps: out holds
-   map_count pictures of one size. sources may be NULL, or width * height of them.
+   map_count pictures of one size. Hidden colours continue what shows around them in the plane, so that
+   windows agree in them, too. sources may be NULL, or width * height of them.
    cost   that of all cells that the window touches (texpatch_plane_cell pixels a side): windows
           of whole cells are cheapest                                                          */
 TEXPATCH_API txm_status texpatch_plane_draw(const texpatch_plane *plane, int64_t x, int64_t y,
@@ -403,7 +403,7 @@ enum {
 
 /* A pixel of the stack of sheets; x = -1: none, the pixel of the canvas is the caller's. */
 typedef struct txp_place {
-    int16_t x, y;
+    int32_t x, y;
 } txp_place;
 
 /* One exemplar in one orientation: rows first .. first + height - 1 of the stack. Its pixel (x, y)
@@ -2182,7 +2182,7 @@ static txm_status txp_show_all(txp_setup *u, txm_arena *memory, txm_env *env) {
 static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_source *s,
                                       txm_env *env) {
     txm_status status = TXM_OK;
-    int bytes = 0, rows = 0;
+    int bytes = 0;
     memset(u, 0, sizeof *u);
     memset(s, 0, sizeof *s);
     if (!d->exemplars || d->exemplar_count < 1 || d->exemplar_count > TEXPATCH_MAX_EXEMPLARS)
@@ -2253,7 +2253,6 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
             return txm_fail(env, TXM_TOO_SMALL, "an exemplar must be 32 x 32 pixels or more");
         if (w > TEXPATCH_MAX_SIDE || h > TEXPATCH_MAX_SIDE)
             return txm_fail(env, TXM_TOO_LARGE, "an exemplar may be 16384 x 16384 pixels at most");
-        rows += (u->turns > 2 ? (w > h ? w : h) : h) * u->turns * (u->mirror ? 2 : 1);
         if ((x->guide.pixels != NULL) != (d->exemplars[0].guide.pixels != NULL))
             return txm_fail(env, TXM_BAD_ARGUMENT, "give all exemplars a guide, or none");
         if (x->guide.pixels) {
@@ -2281,10 +2280,6 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
         return txm_fail(env, TXM_TOO_LARGE,
                         "maps with a weight and the guide may have 16 channels "
                         "together; give some maps weight 0");
-    if (rows > INT16_MAX)
-        return txm_fail(env, TXM_TOO_LARGE,
-                        "the exemplars are too high together (32767 rows, each "
-                        "turned form counted)");
     u->most_weight = s->guide_bytes ? u->guide_weight : 0;
     for (int m = 0; m < u->map_count; m++)
         u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
@@ -2519,8 +2514,8 @@ static int txp_quilt_find(txp_quilt *q, int bx, int by, txp_place *found) {
                 }
                 if (count < TXP_CANDIDATES) {
                     q->near_costs[count] = txm_float(cost);
-                    q->near_places[count].x = (int16_t)x;
-                    q->near_places[count++].y = (int16_t)y;
+                    q->near_places[count].x = x;
+                    q->near_places[count++].y = y;
                 }
             }
         }
@@ -2570,8 +2565,8 @@ static void txp_quilt_lay(txp_quilt *q, int bx, int by, txp_place at) {
                                (is_cut[3] && y - (size - o) > cut[3][x])))
                 continue;
             txp_place p;
-            p.x = (int16_t)(at.x + x);
-            p.y = (int16_t)(at.y + y);
+            p.x = at.x + x;
+            p.y = at.y + y;
             uint32_t *use = q->use.count + p.y / TXP_CELL * q->use.columns + p.x / TXP_CELL;
             if (q->done[i]) {
                 const txp_place old = c->at[i];
@@ -2657,8 +2652,8 @@ static void txp_find_surroundings(txp_search *f) {
         f->around[n].x = f->around[n].y = -1;
         if (cx >= 0 && cy >= 0 && cx < c->width && cy < c->height) {
             const txp_place at = c->at[txp_index(c, cx, cy)];
-            f->around[n].x = (int16_t)(at.x - dx);
-            f->around[n].y = (int16_t)(at.y - dy);
+            f->around[n].x = at.x - dx;
+            f->around[n].y = at.y - dy;
         }
         n++;
     }
@@ -2679,8 +2674,8 @@ static void txp_try(txp_search *f, int x, int y) {
     for (int i = 0; i < 16 && i < f->seen_count; i++) {
         if (f->seen[i].x == x && f->seen[i].y == y) return;
     }
-    f->seen[f->seen_count % 16].x = (int16_t)x;
-    f->seen[f->seen_count++ % 16].y = (int16_t)y;
+    f->seen[f->seen_count % 16].x = x;
+    f->seen[f->seen_count++ % 16].y = y;
     double extra = 0;
     if (s->has_lattice) {
         const double d = txp_off_bond(p->stack, &s->courses, &f->goal, x, y);
@@ -2697,8 +2692,8 @@ static void txp_try(txp_search *f, int x, int y) {
     if (sad + extra >= f->cost) return;
     f->cost = sad + extra;
     f->sad = sad;
-    f->best.x = (int16_t)x;
-    f->best.y = (int16_t)y;
+    f->best.x = x;
+    f->best.y = y;
 }
 
 /* Try the place of the lattice that is nearest to a place. */
@@ -2948,15 +2943,17 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
         int u = 0;
 #ifdef TXP_SSE2
         if (n == 4 && x0 + size <= c->width) {
-            const __m128i zero = _mm_setzero_si128(), four = _mm_set1_epi32(4);
+            const __m128i zero = _mm_setzero_si128(), four = _mm_set_epi32(0, 4, 0, 4);
             const uint8_t *mean = band->mean + (line + (size_t)x0) * 4;
             int32_t *nearest = band->nearest + line + (size_t)x0;
             txp_place *next = c->next + txp_index(c, x0, y), first[4];
             for (int i = 0; i < 4; i++) {
-                first[i].x = (int16_t)(m.x + i);
-                first[i].y = (int16_t)(m.y + v);
+                first[i].x = m.x + i;
+                first[i].y = m.y + v;
             }
+            /* two places in each */
             __m128i place = _mm_loadu_si128((const __m128i *)(const void *)first);
+            __m128i other = _mm_loadu_si128((const __m128i *)(const void *)(first + 2));
             for (; u < size; u += 4, mean += 16, in += 16, nearest += 4, next += 4) {
                 const __m128i a = _mm_loadu_si128((const __m128i *)(const void *)mean);
                 const __m128i b = _mm_loadu_si128((const __m128i *)(const void *)in);
@@ -2971,12 +2968,18 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
                     _mm_castsi128_ps(low), _mm_castsi128_ps(high), _MM_SHUFFLE(3, 1, 3, 1)));
                 const __m128i square = _mm_add_epi32(even, odd);
                 __m128i *o = (__m128i *)(void *)nearest, *at = (__m128i *)(void *)next;
+                __m128i *after = (__m128i *)(void *)(next + 2);
                 const __m128i best = _mm_loadu_si128(o), less = _mm_cmplt_epi32(square, best);
                 _mm_storeu_si128(
                     o, _mm_or_si128(_mm_and_si128(less, square), _mm_andnot_si128(less, best)));
-                _mm_storeu_si128(at, _mm_or_si128(_mm_and_si128(less, place),
-                                                  _mm_andnot_si128(less, _mm_loadu_si128(at))));
-                place = _mm_add_epi16(place, _mm_and_si128(four, _mm_set1_epi32(0xffff)));
+                const __m128i here = _mm_unpacklo_epi32(less, less);
+                const __m128i there = _mm_unpackhi_epi32(less, less);
+                _mm_storeu_si128(at, _mm_or_si128(_mm_and_si128(here, place),
+                                                  _mm_andnot_si128(here, _mm_loadu_si128(at))));
+                _mm_storeu_si128(after, _mm_or_si128(_mm_and_si128(there, other),
+                                                     _mm_andnot_si128(there, _mm_loadu_si128(after))));
+                place = _mm_add_epi32(place, four);
+                other = _mm_add_epi32(other, four);
             }
         }
 #endif
@@ -2988,8 +2991,8 @@ static void txp_pick_window(const txp_pass *p, int w, int x0, int y0, int top, i
             if (d >= band->nearest[line + (size_t)x]) continue;
             band->nearest[line + (size_t)x] = d;
             txp_place *at = c->next + txp_index(c, x, y);
-            at->x = (int16_t)(m.x + u);
-            at->y = (int16_t)(m.y + v);
+            at->x = m.x + u;
+            at->y = m.y + v;
         }
     }
 }
@@ -3081,8 +3084,8 @@ static void txp_polish_band(void *context, int index) {
                 if (qx < 0 || qy < 0 || qx >= c->width || qy >= c->height) continue;
                 txp_place at = c->at[txp_index(c, qx, qy)];
                 if (at.x < 0) continue;
-                at.x = (int16_t)(at.x - (d % 3 - 1));
-                at.y = (int16_t)(at.y - (d / 3 - 1));
+                at.x -= d % 3 - 1;
+                at.y -= d / 3 - 1;
                 int known = 0;
                 for (int t = 0; t < count && !known; t++)
                     known = tried[t].x == at.x && tried[t].y == at.y;
@@ -3356,8 +3359,8 @@ static void txp_measure_band(void *context, int lane) {
                     *bend = *tone = TXP_PULL_SEAM;
                     continue;
                 }
-                a.x = (int16_t)(a.x + !d);
-                a.y = (int16_t)(a.y + d);
+                a.x += !d;
+                a.y += d;
                 if (a.x == q.x && a.y == q.y) continue;
                 if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
                 *tone = TXP_PULL_SEAM;
@@ -3365,8 +3368,8 @@ static void txp_measure_band(void *context, int lane) {
                           by = q.y + shift[1] - 2;
                 int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
                 if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    const txp_place from_a = {(int16_t)ax, (int16_t)ay};
-                    const txp_place from_b = {(int16_t)bx, (int16_t)by};
+                    const txp_place from_a = {ax, ay};
+                    const txp_place from_b = {bx, by};
                     txp_seam_step(s, k, from_a, from_b, sum);
                     for (int b = 0; b < s->guide_at; b++)
                         most = abs(sum[b]) > most ? abs(sum[b]) : most;
@@ -3545,8 +3548,8 @@ static inline txp_place txp_refine_place(const txp_source *s, int level, txp_pla
     const int n = s->sheets > 1 && p.x >= 0 ? c->sheet[p.y] : 0;
     txp_place q = p;
     if (p.x < 0) return q;
-    q.x = (int16_t)(2 * p.x + px);
-    q.y = (int16_t)(f->first[n] + 2 * (p.y - c->first[n]) + py);
+    q.x = 2 * p.x + px;
+    q.y = f->first[n] + 2 * (p.y - c->first[n]) + py;
     return q;
 }
 
@@ -3606,10 +3609,9 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
                     const int sheet = s->sheets > 1 && p.x >= 0 ? s->stack[0].sheet[p.y] : 0;
                     if (p.x >= 0) {
                         const txp_stack *t = &s->stack[level];
-                        p.x = (int16_t)txm_clampi(p.x >> level, 0, t->wide[sheet] - 1);
-                        p.y = (int16_t)(t->first[sheet] +
-                                        txm_clampi((p.y - s->stack[0].first[sheet]) >> level, 0,
-                                                   t->high[sheet] - 1));
+                        p.x = txm_clampi(p.x >> level, 0, t->wide[sheet] - 1);
+                        p.y = t->first[sheet] + txm_clampi((p.y - s->stack[0].first[sheet]) >> level,
+                                                           0, t->high[sheet] - 1);
                     }
                     c->at[i] = p;
                 }
@@ -4852,6 +4854,37 @@ TEXPATCH_API void texpatch_plane_free(texpatch_plane *plane) {
     txm_arena_free(&plane->memory); /* the plane lies in it */
 }
 
+/* Draw a part of a map of a finished cell. What is hidden in it is bled from the whole canvas of the
+   cell, so that all windows show the same.
+   d     the map, with the part's place on the canvas
+   to    the part, in the window                                                              */
+static txm_status txp_plane_draw_map(const txp_draw *d, const txm_image *to, txm_env *env) {
+    const texpatch_job *job = d->job;
+    txp_draw part = *d, all = *d;
+    txm_arena scratch;
+    part.out = *to;
+    txm_status status = txp_draw_rows(&part, 1, env);
+    if (status != TXM_OK || !d->has_alpha || job->setup.kinds[d->map].is_label ||
+        !txm_image_has_hidden(to))
+        return status;
+    txm_arena_init(&scratch, env);
+    const size_t pixel = (size_t)to->channels * txm_sample_bytes(to->sample);
+    all.x = all.y = 0;
+    all.out.width = job->width;
+    all.out.height = job->height;
+    all.out.stride = (ptrdiff_t)((size_t)job->width * pixel);
+    all.out.pixels = txm_arena_alloc(&scratch, (size_t)job->height, (size_t)job->width * pixel);
+    if (!all.out.pixels) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a cell of the plane");
+    if (status == TXM_OK) status = txp_draw_rows(&all, 1, env);
+    if (status == TXM_OK) status = txm_image_bleed(&all.out, 0, env);
+    for (int y = 0; y < to->height && status == TXM_OK; y++)
+        memcpy(txm_image_row(to, y),
+               (const char *)txm_image_row_const(&all.out, d->y + y) + (size_t)d->x * pixel,
+               (size_t)to->width * pixel);
+    txm_arena_free(&scratch);
+    return status;
+}
+
 /* Draw the part of a window on a finished cell, whose pixel (0, 0) is at (cx, cy) of the window. */
 static txm_status txp_plane_draw_cell(const texpatch_job *job, int half, int cell, int64_t cx,
                                       int64_t cy, int width, int height, const txm_image *out,
@@ -4871,7 +4904,7 @@ static txm_status txp_plane_draw_cell(const texpatch_job *job, int half, int cel
         d.job = job;
         d.x = sx;
         d.y = sy;
-        if (status == TXM_OK) status = txp_draw_rows(&d, 1, env);
+        if (status == TXM_OK) status = txp_plane_draw_map(&d, &to, env);
         if (status != TXM_OK) return status;
     }
     for (int y = y0; y < y1 && sources; y++) {
@@ -7080,38 +7113,60 @@ typedef struct txp_rectifying {
     int first; /* row */
 } txp_rectifying;
 
-/* Sample c of a pixel, in the unit of its type. */
-static inline double txp_raw(const void *row, txm_sample sample, size_t i) {
-    if (sample == TXM_U8) return (double)((const uint8_t *)row)[i];
-    if (sample == TXM_U16) return (double)((const uint16_t *)row)[i];
-    return (double)((const float *)row)[i];
-}
-
-/* Add a weighted sample at (x, y), between pixels, to sum: all channels, weighted by the last if
-   it is alpha. */
-static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha, double *sum) {
-    const double fx = floor(x), fy = floor(y);
-    double wx[4], wy[4];
-    const int x0 = (int)fx - 1, y0 = (int)fy - 1, n = im->channels;
+/* 4 x 4 pixels of a picture, from where they begin in its rows, and their weights. */
+typedef struct txp_patch {
+    const void *row[4];
     size_t at[4];
-    txp_cubic(x - fx, wx);
-    txp_cubic(y - fy, wy);
-    for (int i = 0; i < 4; i++) at[i] = (size_t)txm_clampi(x0 + i, 0, im->width - 1) * (size_t)n;
+    double wx[4], wy[4];
+} txp_patch;
+
+/* Add them to sum: all channels, weighted by the last if it is alpha. sample, n and has_alpha are
+   constants where it is called, so that each kind of picture has its own loop. */
+static inline void txp_add_patch(const txp_patch *p, txm_sample sample, int n, int has_alpha, double *sum) {
+    double total[4];
+    for (int c = 0; c < n; c++) total[c] = sum[c];
     for (int j = 0; j < 4; j++) {
-        const void *row = (const char *)im->pixels +
-                          im->stride * (ptrdiff_t)txm_clampi(y0 + j, 0, im->height - 1);
         for (int i = 0; i < 4; i++) {
-            const double w = wx[i] * wy[j];
+            const double w = p->wx[i] * p->wy[j];
+            const size_t at = p->at[i];
             if (has_alpha) {
-                const double alpha = w * txp_raw(row, im->sample, at[i] + (size_t)n - 1);
+                const double alpha =
+                    w * (double)txm_sample_code(p->row[j], sample, at + (size_t)n - 1);
                 for (int c = 0; c < n - 1; c++)
-                    sum[c] += alpha * txp_raw(row, im->sample, at[i] + (size_t)c);
-                sum[n - 1] += alpha;
+                    total[c] += alpha * (double)txm_sample_code(p->row[j], sample, at + (size_t)c);
+                total[n - 1] += alpha;
             } else {
-                for (int c = 0; c < n; c++) sum[c] += w * txp_raw(row, im->sample, at[i] + (size_t)c);
+                for (int c = 0; c < n; c++)
+                    total[c] += w * (double)txm_sample_code(p->row[j], sample, at + (size_t)c);
             }
         }
     }
+    for (int c = 0; c < n; c++) sum[c] = total[c];
+}
+
+/* The same for a type of samples. */
+static inline void txp_add_kind(const txp_patch *p, txm_sample sample, int n, int has_alpha, double *sum) {
+    if (n == 3) txp_add_patch(p, sample, 3, 0, sum);
+    else if (n == 4 && has_alpha) txp_add_patch(p, sample, 4, 1, sum);
+    else if (n == 1) txp_add_patch(p, sample, 1, 0, sum);
+    else txp_add_patch(p, sample, n, has_alpha, sum);
+}
+
+/* Add a sample at (x, y), between pixels, to sum. */
+static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha, double *sum) {
+    const double fx = floor(x), fy = floor(y);
+    const int x0 = (int)fx - 1, y0 = (int)fy - 1, n = im->channels;
+    txp_patch p;
+    txp_cubic(x - fx, p.wx);
+    txp_cubic(y - fy, p.wy);
+    for (int i = 0; i < 4; i++) {
+        p.at[i] = (size_t)txm_clampi(x0 + i, 0, im->width - 1) * (size_t)n;
+        p.row[i] = (const char *)im->pixels +
+                   im->stride * (ptrdiff_t)txm_clampi(y0 + i, 0, im->height - 1);
+    }
+    if (im->sample == TXM_U8) txp_add_kind(&p, TXM_U8, n, has_alpha, sum);
+    else if (im->sample == TXM_U16) txp_add_kind(&p, TXM_U16, n, has_alpha, sum);
+    else txp_add_kind(&p, TXM_F32, n, has_alpha, sum);
 }
 
 /* Turn a normal with the picture: by the rotation that is nearest to the map m. */
@@ -7154,14 +7209,17 @@ static void txp_rectify_row(void *context, int row) {
     const txp_rectifying *q = (const txp_rectifying *)context;
     const txm_image *out = q->out;
     const int y = q->first + row;
-    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1};
+    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1}, ahead[4] = {1, 0, 0, 1};
     int samples = 1;
+    txp_straight_at(q->frame, 0, y, &x1, &y1, ahead);
     for (int x = 0; x < out->width; x++) {
         float v[4] = {0, 0, 0, 0};
         const int part = x % TXP_STRIDE;
         if (part == 0) {
-            txp_straight_at(q->frame, x + TXP_STRIDE, y, &x1, &y1, m);
-            txp_straight_at(q->frame, x, y, &x0, &y0, m);
+            x0 = x1;
+            y0 = y1;
+            memcpy(m, ahead, sizeof m);
+            txp_straight_at(q->frame, x + TXP_STRIDE, y, &x1, &y1, ahead);
             const double wide = sqrt(m[0] * m[0] + m[2] * m[2]);
             const double high = sqrt(m[1] * m[1] + m[3] * m[3]), most = fmax(wide, high);
             samples = most < TXP_SHRINKING ? 1 : txm_clampi((int)ceil(most), 1, TXP_MOST_SAMPLES);

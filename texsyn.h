@@ -6508,7 +6508,7 @@ TEXSYN_API txm_status texsyn_fill(const texsyn_fill_desc *desc, txm_env *env, tx
     }
     if (status == TXM_OK && txm_image_has_alpha(&filler.image)) { /* known pixels stay, to the byte */
         txm_mask_read(&desc->mask, TXM_MASK_REPLACES, filler.state);
-        status = txm_image_bleed_part(&filler.image, filler.state, 0, env);
+        status = txm_image_bleed_part(&filler.image, filler.state, 0, 1, 1, env);
     }
     if (status == TXM_OK) txs_copy_picture(&filler.image, &out);
     txm_arena_free(&arena);

@@ -41,38 +41,60 @@ typedef struct txp_rectifying {
     int first; /* row */
 } txp_rectifying;
 
-/* Sample c of a pixel, in the unit of its type. */
-static inline double txp_raw(const void *row, txm_sample sample, size_t i) {
-    if (sample == TXM_U8) return (double)((const uint8_t *)row)[i];
-    if (sample == TXM_U16) return (double)((const uint16_t *)row)[i];
-    return (double)((const float *)row)[i];
-}
-
-/* Add a weighted sample at (x, y), between pixels, to sum: all channels, weighted by the last if
-   it is alpha. */
-static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha, double *sum) {
-    const double fx = floor(x), fy = floor(y);
-    double wx[4], wy[4];
-    const int x0 = (int)fx - 1, y0 = (int)fy - 1, n = im->channels;
+/* 4 x 4 pixels of a picture, from where they begin in its rows, and their weights. */
+typedef struct txp_patch {
+    const void *row[4];
     size_t at[4];
-    txp_cubic(x - fx, wx);
-    txp_cubic(y - fy, wy);
-    for (int i = 0; i < 4; i++) at[i] = (size_t)txm_clampi(x0 + i, 0, im->width - 1) * (size_t)n;
+    double wx[4], wy[4];
+} txp_patch;
+
+/* Add them to sum: all channels, weighted by the last if it is alpha. sample, n and has_alpha are
+   constants where it is called, so that each kind of picture has its own loop. */
+static inline void txp_add_patch(const txp_patch *p, txm_sample sample, int n, int has_alpha, double *sum) {
+    double total[4];
+    for (int c = 0; c < n; c++) total[c] = sum[c];
     for (int j = 0; j < 4; j++) {
-        const void *row = (const char *)im->pixels +
-                          im->stride * (ptrdiff_t)txm_clampi(y0 + j, 0, im->height - 1);
         for (int i = 0; i < 4; i++) {
-            const double w = wx[i] * wy[j];
+            const double w = p->wx[i] * p->wy[j];
+            const size_t at = p->at[i];
             if (has_alpha) {
-                const double alpha = w * txp_raw(row, im->sample, at[i] + (size_t)n - 1);
+                const double alpha =
+                    w * (double)txm_sample_code(p->row[j], sample, at + (size_t)n - 1);
                 for (int c = 0; c < n - 1; c++)
-                    sum[c] += alpha * txp_raw(row, im->sample, at[i] + (size_t)c);
-                sum[n - 1] += alpha;
+                    total[c] += alpha * (double)txm_sample_code(p->row[j], sample, at + (size_t)c);
+                total[n - 1] += alpha;
             } else {
-                for (int c = 0; c < n; c++) sum[c] += w * txp_raw(row, im->sample, at[i] + (size_t)c);
+                for (int c = 0; c < n; c++)
+                    total[c] += w * (double)txm_sample_code(p->row[j], sample, at + (size_t)c);
             }
         }
     }
+    for (int c = 0; c < n; c++) sum[c] = total[c];
+}
+
+/* The same for a type of samples. */
+static inline void txp_add_kind(const txp_patch *p, txm_sample sample, int n, int has_alpha, double *sum) {
+    if (n == 3) txp_add_patch(p, sample, 3, 0, sum);
+    else if (n == 4 && has_alpha) txp_add_patch(p, sample, 4, 1, sum);
+    else if (n == 1) txp_add_patch(p, sample, 1, 0, sum);
+    else txp_add_patch(p, sample, n, has_alpha, sum);
+}
+
+/* Add a sample at (x, y), between pixels, to sum. */
+static void txp_add_cubic(const txm_image *im, double x, double y, int has_alpha, double *sum) {
+    const double fx = floor(x), fy = floor(y);
+    const int x0 = (int)fx - 1, y0 = (int)fy - 1, n = im->channels;
+    txp_patch p;
+    txp_cubic(x - fx, p.wx);
+    txp_cubic(y - fy, p.wy);
+    for (int i = 0; i < 4; i++) {
+        p.at[i] = (size_t)txm_clampi(x0 + i, 0, im->width - 1) * (size_t)n;
+        p.row[i] = (const char *)im->pixels +
+                   im->stride * (ptrdiff_t)txm_clampi(y0 + i, 0, im->height - 1);
+    }
+    if (im->sample == TXM_U8) txp_add_kind(&p, TXM_U8, n, has_alpha, sum);
+    else if (im->sample == TXM_U16) txp_add_kind(&p, TXM_U16, n, has_alpha, sum);
+    else txp_add_kind(&p, TXM_F32, n, has_alpha, sum);
 }
 
 /* Turn a normal with the picture: by the rotation that is nearest to the map m. */
@@ -115,14 +137,17 @@ static void txp_rectify_row(void *context, int row) {
     const txp_rectifying *q = (const txp_rectifying *)context;
     const txm_image *out = q->out;
     const int y = q->first + row;
-    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1};
+    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, m[4] = {1, 0, 0, 1}, ahead[4] = {1, 0, 0, 1};
     int samples = 1;
+    txp_straight_at(q->frame, 0, y, &x1, &y1, ahead);
     for (int x = 0; x < out->width; x++) {
         float v[4] = {0, 0, 0, 0};
         const int part = x % TXP_STRIDE;
         if (part == 0) {
-            txp_straight_at(q->frame, x + TXP_STRIDE, y, &x1, &y1, m);
-            txp_straight_at(q->frame, x, y, &x0, &y0, m);
+            x0 = x1;
+            y0 = y1;
+            memcpy(m, ahead, sizeof m);
+            txp_straight_at(q->frame, x + TXP_STRIDE, y, &x1, &y1, ahead);
             const double wide = sqrt(m[0] * m[0] + m[2] * m[2]);
             const double high = sqrt(m[1] * m[1] + m[3] * m[3]), most = fmax(wide, high);
             samples = most < TXP_SHRINKING ? 1 : txm_clampi((int)ceil(most), 1, TXP_MOST_SAMPLES);
