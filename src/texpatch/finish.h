@@ -72,13 +72,14 @@ static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *n
     const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
     const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
     const float unit = 255.0f / (float)TXP_JUMP_UNIT;
+    const float beyond = 1.6f; /* a variable: where floats are computed in double, so are constants */
     const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
     const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
     for (int k = 0; k < lanes; k++) {
         const float across = txm_float(txm_float(l * a[k]) + txm_float(r * b[k]));
         const float along = txm_float(txm_float(u * c[k]) + txm_float(d * e[k]));
         const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)jump[k]));
-        own[k] = txm_float(own[k] + txm_float(1.6f * txm_float(txm_float(all * scale) - own[k])));
+        own[k] = txm_float(own[k] + txm_float(beyond * txm_float(txm_float(all * scale) - own[k])));
     }
 }
 
