@@ -613,6 +613,7 @@ static void txi_nearest_marks(const uint8_t *marks, int width, int height, int32
                 count--;
             }
             if (begin >= width) continue;
+            TXM_ASSERT(count < width);
             stack[count] = x;
             from[count++] = begin;
         }
@@ -961,6 +962,7 @@ static txm_status txi_weld(const txm_mesh *mesh, txi_surface *s, uint32_t *weld,
         }
         if (table[slot] == UINT32_MAX) {
             table[slot] = (uint32_t)s->vertex_count;
+            TXM_ASSERT(s->vertex_count < mesh->vertex_count);
             s->point[s->vertex_count++] = txm_d3_load(p);
         }
         weld[v] = table[slot];
@@ -1444,6 +1446,7 @@ static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
         size_t length = 0;
         for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
+            TXM_ASSERT(length < f->count);
             f->path[length++] = i;
             f->flag[i] = k;
         }
@@ -1850,6 +1853,7 @@ static void txi_flat_edges(txi_flat *flat, uint32_t *first, uint32_t *sides, uin
             if (seen[other] != v) {
                 seen[other] = v;
                 seen_edge[other] = (uint32_t)flat->edge_count;
+                TXM_ASSERT(flat->edge_count < count);
                 flat->low[flat->edge_count] = v;
                 flat->high[flat->edge_count++] = other;
             }
@@ -3678,6 +3682,7 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         target.y = txm_float(y);
         target.axis = txm_v2(1, 0);
         target.mirrored = 0;
+        TXM_ASSERT(w->target_count < count);
         w->targets[w->target_count++] = target;
     }
     return TXM_OK;
@@ -4085,6 +4090,7 @@ typedef struct txi_links {
 
 static void txi_links_add(txi_links *links, int64_t texel, double weight) {
     if (texel < 0 || !(weight > 0)) return;
+    TXM_ASSERT(links->count < TXI_LINKS_MOST);
     links->texel[links->count] = (uint32_t)texel;
     links->weight[links->count++] = weight;
 }
@@ -4252,7 +4258,9 @@ static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_
     if (arena->failed) return txi_no_memory(env);
     for (size_t i = 0; i < texels; i++) {
         node[i] = (uint32_t)count;
-        if (marks[i] == TXI_NODE_UNKNOWN) g->texel[count++] = (uint32_t)i;
+        if (marks[i] != TXI_NODE_UNKNOWN) continue;
+        TXM_ASSERT(count < g->count);
+        g->texel[count++] = (uint32_t)i;
     }
     txi_graph_pass(d, marks, node, 0, g, total);
     if (total[0] > UINT32_MAX || total[1] > UINT32_MAX)
@@ -4284,6 +4292,7 @@ static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *
         for (uint32_t l = g->first[queue[k]]; l < g->first[queue[k] + 1]; l++) {
             if (!mark[g->to[l]]) continue;
             mark[g->to[l]] = 0;
+            TXM_ASSERT(count < g->count);
             queue[count++] = g->to[l];
         }
     }
@@ -4900,6 +4909,7 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
             if (queued[j]) continue;
             queued[j] = 1;
             const size_t end = head + waiting;
+            TXM_ASSERT(waiting < g->count);
             queue[end < g->count ? end : end - g->count] = j;
             waiting++;
         }
@@ -5268,6 +5278,7 @@ static void txi_shape_orient(const txm_mesh *mesh, const uint32_t *next, uint32_
                 flip[g] = (uint8_t)(flip[queue[i]] ^ (txm_mesh_runs_down(mesh, side) ==
                                                       txm_mesh_runs_down(mesh, other)));
                 turned += flip[g];
+                TXM_ASSERT(count < mesh->face_count);
                 queue[count++] = (uint32_t)g;
             }
         }
@@ -5680,10 +5691,12 @@ static void txi_crest_links(const txi_shape *s, const uint32_t *node, txi_crest_
             if (node[s->edge[3 * f + i]] != UINT32_MAX) n[count++] = node[s->edge[3 * f + i]];
         }
         if (count == 2) {
+            TXM_ASSERT(links < net->link_count);
             net->link[2 * links] = n[0];
             net->link[2 * links++ + 1] = n[1];
         } else if (count == 3) {
             txm_dvec3 sum = txm_d3(0, 0, 0);
+            TXM_ASSERT(centre < net->node_count && links + 3 <= net->link_count);
             net->k[centre] = net->sharp[centre] = 0;
             for (int i = 0; i < 3; i++) {
                 sum = txm_d3_add(sum, net->place[n[i]]);
@@ -6005,6 +6018,7 @@ static int txi_prior_add(txi_prior_list *list, txm_vec2 p, txm_arena *arena) {
             if (!txi_prior_reserve(list, 1, arena)) return 0;
         }
     }
+    TXM_ASSERT((size_t)list->open < list->point_room);
     list->points[list->open++] = p;
     return 1;
 }
@@ -7188,6 +7202,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
         if (at < 0) return 0;
         txi_change_at(f, (size_t)at, -k.dy, k.dx, k.change);
         if (way == 1) {
+            TXM_ASSERT(inner < capacity);
             while (inner > 0) points[n++] = back[--inner];
             points[n++] = from->place;
         }
@@ -8204,6 +8219,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
         }
         if (fabs(best) < 6.5) {
             if (!hits) first = beyond;
+            TXM_ASSERT(hits < TXI_LOOK_AHEAD);
             offsets[hits++] = best;
         }
         beyond++;
@@ -8390,6 +8406,7 @@ static double txi_link_energy(txi_pairing *m, int k) {
 }
 
 static void txi_activate(txi_pairing *m, int k) {
+    TXM_ASSERT(m->active_count < m->link_count);
     m->slot[k] = m->active_count;
     m->active[m->active_count++] = k;
     m->chosen[m->links[k].a] = k;
@@ -8695,7 +8712,9 @@ static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *mat
         const txm_status status =
             txi_curve_make(pairs, &match->links[k], dense, dense + room, room, arena, env, &c);
         if (status != TXM_OK) return status;
-        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+        if (c.first < 0 || c.last <= c.first) continue;
+        TXM_ASSERT(*count < l->end_count); /* an end has one curve at most */
+        curves[(*count)++] = c;
     }
     const int whole = *count;
     for (int e = 0; e < l->end_count; e++) {
@@ -8708,7 +8727,9 @@ static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *mat
         if (!txi_meet_curve(l, &l->ends[e], curves, whole, 0.75 * l->width, &k)) continue;
         const txm_status status = txi_curve_make(pairs, &k, dense, dense + room, room, arena, env, &c);
         if (status != TXM_OK) return status;
-        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+        if (c.first < 0 || c.last <= c.first) continue;
+        TXM_ASSERT(*count < l->end_count);
+        curves[(*count)++] = c;
     }
     return TXM_OK;
 }
@@ -9191,6 +9212,7 @@ static int txi_belief_order(txi_beliefs *t) {
                 const int m = txi_other_end(g, t->arm[i], n);
                 if (!t->is_free[m] || t->parent[m] != -2) continue;
                 t->parent[m] = t->arm[i];
+                TXM_ASSERT(count < g->node_count);
                 t->order[count++] = m;
             }
         }
@@ -10498,6 +10520,7 @@ static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int 
         const int point = txi_flank_point(c, end, i);
         if (point < 0) break;
         const double width = txi_flank_width(w, c, point, side, f->color, differs);
+        TXM_ASSERT(n < TXI_FLANK_KNOWN);
         if (width > 0) widths[n++] = width;
         others = width < 0 ? others + 1 : 0;
     }
@@ -11180,6 +11203,7 @@ static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_line
             if (k == 0) continue;
             all->ends[2 * link] = node - 1;
             all->ends[2 * link + 1] = node;
+            TXM_ASSERT(link < all->link_count);
             all->link_strip[link++] = i;
         }
     }
@@ -11968,10 +11992,14 @@ static int txi_level_lists(txi_level *l, txm_arena *arena) {
             l->hole_row[p / w] = h;
             l->anchor_row[p / w] = a;
         }
-        if (l->state[p] == TXI_HOLE) l->hole[h++] = p;
+        if (l->state[p] == TXI_HOLE) {
+            TXM_ASSERT(h < l->hole_count);
+            l->hole[h++] = p;
+        }
         if (!touch[p]) continue;
         l->slot[p] = a;
         l->filled[a] = touch[p];
+        TXM_ASSERT(a < l->anchor_count);
         l->anchor[a++] = p;
     }
     l->hole_row[l->height] = h;
@@ -12426,6 +12454,7 @@ static int txi_level_sources(txi_level *l, int is_picture, int pose_count, const
         s->color = (uint8_t *)txm_arena_alloc(arena, n, 4);
         s->usable = (uint8_t *)txm_arena_alloc(arena, n, 1);
         s->worth = (uint16_t *)txm_arena_alloc(arena, n, sizeof(uint16_t));
+        TXM_ASSERT(count < TXI_MAX_POSES);
         task.pose[count] = pose;
         task.numbers[count] = (uint32_t *)txm_arena_alloc(&scratch, n, 2 * sizeof(uint32_t));
         task.columns[count++] =
@@ -12895,7 +12924,9 @@ static void txi_onion_list(txi_onion *o, const uint8_t *ring, int share) {
         int covers = 0;
         for (int k = 0; !covers && k < TXI_PATCH_AREA; k++)
             covers = ring[p + k / TXI_PATCH * l->width + k % TXI_PATCH];
-        if (covers) o->todo[o->todo_count++] = a;
+        if (!covers) continue;
+        TXM_ASSERT(o->todo_count < l->anchor_count);
+        o->todo[o->todo_count++] = a;
     }
 }
 
@@ -12934,7 +12965,9 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
             least = d;
             memcpy(t->color + 4 * (size_t)p, color[k], 3);
         }
-        if (n) o->todo[l->anchor_count + filled++] = p;
+        if (!n) continue;
+        TXM_ASSERT(filled < l->hole_count);
+        o->todo[l->anchor_count + filled++] = p;
     }
     for (int k = 0; k < filled; k++)
         memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);
@@ -13288,6 +13321,7 @@ static int txi_proposals(const txi_canvas *t, int p, txi_proposal *list) {
             const txi_source *s = &l->source[m->pose];
             list[count].color =
                 s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
+            TXM_ASSERT(count < TXI_PATCH_AREA);
             list[count++].anchor = a;
         }
     }
@@ -13501,6 +13535,7 @@ static int txi_expansion_region(txi_assembly *t, int32_t alpha, int reach) {
                 if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP)
                     continue;
                 t->node[q] = 0;
+                TXM_ASSERT(count < l->hole_count);
                 t->region[count++] = q;
                 if (x < low[0]) low[0] = x;
                 if (y < low[1]) low[1] = y;

@@ -41,7 +41,9 @@
      }
 
    CONFIGURATION
-     None. Every function is static inline, there is no implementation section: include the file
+     TXM_ASSERT(x)          checks for errors in the library, which no input can trigger; default
+                            assert of <assert.h>
+     Every function is static inline, there is no implementation section: include the file
      wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
 
    CONVENTIONS
@@ -104,6 +106,12 @@
 #include <string.h>
 
 #define TEXMATH_VERSION "0.2.0"
+
+/* what no input can make false: an error in the library */
+#ifndef TXM_ASSERT
+#include <assert.h>
+#define TXM_ASSERT(x) assert(x)
+#endif
 
 #define TXM_PI 3.14159265358979323846
 
@@ -1076,6 +1084,7 @@ static inline void txm_bleed_begin(txm_bleed *b, const txm_image *image, int wra
     b->lanes = image->channels;
     b->pixels = (double)width * height;
     do {
+        TXM_ASSERT(b->levels + 1 < TXM_BLEED_LEVELS);
         txm_bleed_level *to = &b->level[++b->levels];
         to->width = width = width / 2 + width % 2;
         to->height = height = height / 2 + height % 2;
@@ -1993,6 +2002,7 @@ static inline void txm_uneven_basis(txm_uneven_grid *g) {
             if (!(after > 1e-9 * before)) continue;
             const double scale = sqrt(g->cells / after);
             for (int i = 0; i < TXM_UNEVEN_COUNT; i++) f[i] *= scale;
+            TXM_ASSERT(g->functions < (int)(sizeof g->degree / sizeof *g->degree));
             g->degree[g->functions++] = degree;
         }
     }

@@ -1728,6 +1728,7 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
         const int w = u->maps[e][0].width, h = u->maps[e][0].height;
         for (int m = 0; m <= (u->mirror ? 1 : 0); m++) {
             for (int t = 0; t < 4; t += 4 / u->turns) {
+                TXM_ASSERT(s->sheets < TXP_MAX_SHEETS);
                 txp_sheet *k = &s->sheet[s->sheets++];
                 k->exemplar = e;
                 k->turn = t + 4 * m;
@@ -3089,7 +3090,9 @@ static void txp_polish_band(void *context, int index) {
                 int known = 0;
                 for (int t = 0; t < count && !known; t++)
                     known = tried[t].x == at.x && tried[t].y == at.y;
-                if (!known) tried[count++] = at;
+                if (known) continue;
+                TXM_ASSERT(count < 9); /* the own one and those of 8 neighbours */
+                tried[count++] = at;
             }
             if (count == 1) continue;
             /* the 5 x 5 pixels around it, moved inwards at borders that do not wrap */
@@ -3186,13 +3189,14 @@ static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *n
     const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
     const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
     const float unit = 255.0f / (float)TXP_JUMP_UNIT;
+    const float beyond = 1.6f; /* a variable: where floats are computed in double, so are constants */
     const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
     const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
     for (int k = 0; k < lanes; k++) {
         const float across = txm_float(txm_float(l * a[k]) + txm_float(r * b[k]));
         const float along = txm_float(txm_float(u * c[k]) + txm_float(d * e[k]));
         const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)jump[k]));
-        own[k] = txm_float(own[k] + txm_float(1.6f * txm_float(txm_float(all * scale) - own[k])));
+        own[k] = txm_float(own[k] + txm_float(beyond * txm_float(txm_float(all * scale) - own[k])));
     }
 }
 
@@ -3488,11 +3492,18 @@ static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_o
     memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof(float));
 }
 
+/* The next step; there is room for two windows on all levels, 16 passes each, the quilt, polishing twice
+   and the finish. */
+static txp_step *txp_add_step(texpatch_job *job) {
+    TXM_ASSERT(job->step_count < TXP_MAX_STEPS);
+    return &job->steps[job->step_count++];
+}
+
 static void txp_setup_steps(texpatch_job *job) {
     const txp_source *s = job->source;
     const int top = s->levels - 1, passes = job->setup.passes;
     job->step_count = job->next_step = 0;
-    txp_step *t = &job->steps[job->step_count++];
+    txp_step *t = txp_add_step(job);
     t->kind = TXP_STEP_QUILT;
     t->level = top;
     t->cost = 1;
@@ -3500,7 +3511,7 @@ static void txp_setup_steps(texpatch_job *job) {
         for (int half = 0; half < 2; half++) {
             const int count = l == 0 && job->setup.is_default ? 2 : passes;
             for (int i = 0; i < count; i++) {
-                t = &job->steps[job->step_count++];
+                t = txp_add_step(job);
                 t->kind = TXP_STEP_PASS;
                 t->level = l;
                 t->round = i;
@@ -3512,13 +3523,13 @@ static void txp_setup_steps(texpatch_job *job) {
         }
     }
     for (int i = 0; i < 2 && passes > 0; i++) {
-        t = &job->steps[job->step_count++];
+        t = txp_add_step(job);
         t->kind = TXP_STEP_POLISH;
         t->level = 0;
         t->round = i;
         t->cost = 0.2f;
     }
-    t = &job->steps[job->step_count++];
+    t = txp_add_step(job);
     t->kind = TXP_STEP_FINISH;
     t->level = 0;
     t->cost = 0.5f;

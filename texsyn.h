@@ -2673,6 +2673,7 @@ static txs_stencil txs_stencil_of(const txs_learner *a, const txs_type *t) {
 }
 
 static txs_type *txs_add_type(txs_level *l, int kind, int band, int other, int dx, int dy) {
+    TEXSYN_ASSERT(l->type_count < TXS_MAX_TYPES);
     txs_type *t = &l->types[l->type_count++];
     memset(t, 0, sizeof *t);
     t->kind = kind;
@@ -4460,6 +4461,7 @@ static txs_guard txs_guard_make(const txs_mosaic *m, const txs_type *t, int labe
     for (int i = 0; i < members; i++) {
         const int is_parent = t->kind == TEXSYN_SCALE && i >= 2;
         if (i == member) continue;
+        TEXSYN_ASSERT(g.count < (int)(sizeof g.at / sizeof *g.at));
         g.at[g.count++] = (at[i][1] - at[member][1]) * m->canvas.stride + at[i][0] - at[member][0] +
                           (is_parent ? m->parent : labels);
     }
@@ -4636,6 +4638,7 @@ static void txs_part_add_crossing(txs_brush *s, int label, int far_, int band, i
         e->o1 = far_band * s->mosaic->canvas.plane + d;
         e->classes = s->texture[far_].level->classes[far_band];
         e->table = table;
+        TEXSYN_ASSERT(g->count < (int)(sizeof g->at / sizeof *g->at));
         g->at[g->count++] = s->mosaic->label + d;
         g->label = far_;
         part->cross_count[band]++;
@@ -5985,6 +5988,7 @@ static txs_hole txs_take_cells(uint8_t *cell, int width, int height, int32_t *st
             const int nx = x + k % 3 - 1, ny = y + k / 3 - 1;
             if (nx < 0 || ny < 0 || nx >= width || ny >= height || !cell[ny * width + nx]) continue;
             cell[ny * width + nx] = 0;
+            TEXSYN_ASSERT(count < width * height);
             stack[count++] = ny * width + nx;
         }
     }
@@ -9906,6 +9910,7 @@ static int txs_lay_add_worst(txs_lay_level *l, const txs_lay_view *source, const
             if (distance[i] > distance[worst]) worst = i;
         if (count == 0 || !(distance[worst] > threshold)) break;
         const txs_lay_type chosen = candidates[worst];
+        TEXSYN_ASSERT(l->type_count < TXS_LAY_TYPES);
         l->types[l->type_count++] = chosen;
         for (int i = 0; i < count; i++) /* its neighbours say the same */
             if (abs(candidates[i].dx - chosen.dx) <= 1 && abs(candidates[i].dy - chosen.dy) <= 1)
@@ -11165,6 +11170,7 @@ static double txs_limit(double x, double low, double high) {
 }
 
 static void txs_add_knot(texsyn_light *l, double from, double to) {
+    TEXSYN_ASSERT(l->knots < (int)(sizeof l->from / sizeof *l->from));
     l->from[l->knots] = txm_float(from);
     l->to[l->knots++] = txm_float(to);
 }
@@ -12321,6 +12327,7 @@ static int txs_move_tries(txs_laying *l) {
     }
     for (int k = 0; k < TXS_FINALISTS; k++) {
         for (int i = 0; i < TXS_MOVED; i++) {
+            TEXSYN_ASSERT(count < TXS_TRIES);
             txs_place_of *p = &l->tries[count++];
             const int side = 2 * TXS_MOVES + 1;
             *p = finalists[k];

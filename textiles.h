@@ -1378,6 +1378,7 @@ static int txt_decided_base(const txt_solver *s, uint32_t cell) {
 static void txt_enqueue(txt_solver *s, uint32_t cell) {
     if (s->queued[cell]) return;
     s->queued[cell] = 1;
+    TXM_ASSERT(s->queue_length < s->cells);
     s->queue[s->queue_length++] = cell;
 }
 
@@ -1392,6 +1393,7 @@ static void txt_narrow(txt_solver *s, uint32_t cell, const uint32_t slot[4], uin
             if (domain & s->having[k][c]) after = (uint8_t)(after | 1 << c);
         }
         if (after == before) continue;
+        TXM_ASSERT(s->trail_length < 3 * s->slots);
         s->trail[s->trail_length++] = slot[k] * 16 + before;
         s->colors[slot[k]] = after;
         if (k == 0 && (cell >= w || s->periodic)) txt_enqueue(s, cell >= w ? cell - w : cell + last);
@@ -1474,6 +1476,7 @@ static int txt_attempt(txt_solver *s, txm_rng *rng) {
             furthest = scan;
             failures = 0;
         }
+        TXM_ASSERT(depth < s->cells);
         txt_decision *d = &s->decisions[depth++];
         int base = txt_draw_base(s, cell, domain, rng);
         d->cell = cell;
@@ -2779,6 +2782,7 @@ static void txt_list_features(txt_build *b) {
         const int n = b->set->maps[m].channels;
         if (m && b->features + n > TXT_MAX_FEATURES) continue;
         for (int c = 0; c < n; c++) {
+            TXM_ASSERT(b->features < TXT_MAX_FEATURES);
             b->feature_map[b->features] = m;
             b->feature_channel[b->features++] = c;
         }

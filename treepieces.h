@@ -823,6 +823,7 @@ typedef struct tpc_shape {
 /* A vertex with weight `own` for the piece's own bone; the rest is shared evenly by the leaf rims
    of the bit mask `leaves`. */
 static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, int leaves) {
+    TXM_ASSERT(s->piece.vertex_count < (int)(sizeof s->vertices / sizeof *s->vertices));
     treepieces_vertex *v = &s->vertices[s->piece.vertex_count];
     const int count = (leaves & 1) + (leaves >> 1 & 1) + (leaves >> 2 & 1);
     memset(v, 0, sizeof *v);
@@ -884,6 +885,7 @@ static const int *tpc_add_leaf_rim(tpc_shape *s, float x, float y, float z, doub
 
 static void tpc_add_quad(tpc_shape *s, int nw, int sw, int se, int ne, treepieces_class c,
                          int band) {
+    TXM_ASSERT(s->piece.quad_count < (int)(sizeof s->quads / sizeof *s->quads));
     treepieces_quad *q = &s->quads[s->piece.quad_count++];
     q->corners[0] = (uint8_t)nw;
     q->corners[1] = (uint8_t)sw;
@@ -1219,6 +1221,7 @@ static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *
             const uint8_t *c = p->quads[i].corners;
             for (int k = 0; k < 4; k++) {
                 if (c[k] != v) continue;
+                TXM_ASSERT(count < TREEPIECES_MAX_QUADS);
                 from[count] = c[(k + 1) % 4];
                 to[count++] = c[(k + 3) % 4];
             }
@@ -1380,6 +1383,7 @@ static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *fro
     tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
     if (kit->arena.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
+    TXM_ASSERT(kit->count < TREEPIECES_MAX_TYPES);
     treepieces_piece *p = &kit->pieces[kit->count];
     *p = *from;
     memcpy(v, from->vertices, vertices * sizeof *v);
@@ -2860,6 +2864,7 @@ static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_ch
 }
 
 static void tpc_add_cluster(tpc_growth *g, int type) {
+    TXM_ASSERT(g->cluster_count < g->most);
     treepieces_cluster *c = &g->clusters[g->cluster_count++];
     c->node = (uint32_t)(g->node_count - 1);
     c->along = type == TREEPIECES_TIP ? 0.7f : tpc_uniform(g, 0.2f, 1);
@@ -2934,6 +2939,7 @@ static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choic
     if (!p->leaf_count) return;
 
     for (int k = 0; k < p->leaf_count; k++) {
+        TXM_ASSERT(g->bud_count < g->most); /* each becomes a node, see tpc_grow */
         tpc_bud *next = &g->buds[g->bud_count];
         *next = *bud;
         next->seed = txm_hash(bud->seed + (uint64_t)(k + 1) * 0x9e3779b97f4a7c15u);
@@ -3186,6 +3192,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->desc = p->desc;
         g->kit = p->desc->kit;
         g->most = most;
+        /* a tree has at most `most` nodes; each was a bud once, and has one cluster at most */
         g->nodes = (treepieces_node *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->nodes);
         g->bands = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->bands);
         g->records = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->records);

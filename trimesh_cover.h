@@ -1113,6 +1113,7 @@ static void tmc_breadth_first(const uint32_t *next, size_t triangles, uint8_t *s
                 for (size_t s = next[side]; s != side; s = next[s]) {
                     if (seen[s / 3]) continue;
                     seen[s / 3] = 1;
+                    TXM_ASSERT(end < triangles);
                     order[end++] = (uint32_t)(s / 3);
                 }
             }
@@ -2016,7 +2017,9 @@ static void tmc_fill_cells(tmc_swarm *s) {
     for (int i = s->fixed; i < s->count; i++) {
         for (int k = 0; k < 3; k++) {
             const tmc_uv image = tmc_mirror(s->at[i], k);
-            if (tmc_uv_dist2(image, s->at[i]) < 4 * s->radius * s->radius) s->at[s->all++] = image;
+            if (!(tmc_uv_dist2(image, s->at[i]) < 4 * s->radius * s->radius)) continue;
+            TXM_ASSERT(s->all < 4 * s->count); /* itself and three images */
+            s->at[s->all++] = image;
         }
     }
     for (int c = 0; c < s->cells * s->cells; c++) s->head[c] = -1;
@@ -2059,12 +2062,14 @@ static void tmc_swarm_start(tmc_swarm *s, int steps, int hexagonal, uint64_t see
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < steps; i++) {
             const double t = (double)i / steps;
+            TXM_ASSERT(n < s->count);
             s->at[n].u = k == 0 ? t : k == 1 ? 1 - t : 0;
             s->at[n++].v = k == 0 ? 0 : k == 1 ? t : 1 - t;
         }
     }
     for (int j = 1; j < steps && hexagonal; j++) {
         for (int i = 1; i + j < steps; i++) {
+            TXM_ASSERT(n < s->count);
             s->at[n].u = (double)i / steps;
             s->at[n++].v = (double)j / steps;
         }

@@ -755,6 +755,7 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
             const int32_t g = m->opposite[c] < 0 ? f : m->opposite[c] / 3;
             if (!m->twin[g] || m->flag[g]) continue;
             m->flag[g] = 1;
+            TRIMESH_ASSERT(top < m->face_count);
             m->list[top++] = g;
         }
     }
@@ -891,6 +892,7 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
             const uint8_t want = (uint8_t)(alike ? m->flag[f] : 3 - m->flag[f]);
             if (m->flag[g] == 0) {
                 m->flag[g] = want;
+                TRIMESH_ASSERT(count < m->face_count);
                 m->list[count++] = g;
             } else if (m->flag[g] != want) {
                 *bad = c;
@@ -1283,6 +1285,7 @@ static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, i
         s->normal[f] = txm_d3_unit(n);
         if (tmr_is_thin(m, p)) {
             s->normal[f] = txm_d3(0, 0, 0);
+            TRIMESH_ASSERT(*count < s->face_count);
             thin[(*count)++] = f;
         }
     }
@@ -1320,6 +1323,7 @@ static void tmr_find_components(tmr_surface *s, int32_t *queue) {
                 const int32_t g = s->opposite[c] / 3;
                 if (s->opposite[c] < 0 || s->component[g] >= 0) continue;
                 s->component[g] = s->component_count;
+                TRIMESH_ASSERT(count < s->face_count);
                 queue[count++] = g;
             }
         }
@@ -1587,6 +1591,7 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
     }
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_represents_edge(s, c)) continue;
+        TRIMESH_ASSERT(count[s->vertex[tmr_next(c)]] < total && count[s->vertex[tmr_prev(c)]] < total);
         ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
         ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
     }
@@ -1616,6 +1621,7 @@ static txm_status tmr_drop_short_lines(tmr_surface *s, const tmr_ends *ends, dou
                 length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
                     seen[w] = 1;
+                    TRIMESH_ASSERT(size < n);
                     stack[size++] = w;
                 }
             }
@@ -5948,11 +5954,13 @@ static double tmr_box_dist2(const tmr_tree *t, int32_t i, txm_dvec3 p) {
     return x * x + y * y + z * z;
 }
 
+enum { TMR_TREE_DEPTH = 64 }; /* each level leaves one node on the stack: of 2^31 at most 31, and one */
+
 /* The triangle nearest to p within reach whose normal agrees with n to the cosine `agree`; -1:
    none. *at: the place on it. */
 static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, double agree,
                                 double reach, tmr_place *at) {
-    int32_t stack[64], size = 0, best = -1;
+    int32_t stack[TMR_TREE_DEPTH], size = 0, best = -1;
     double least = reach * reach;
     stack[size++] = 0;
     while (size > 0) {
@@ -5960,6 +5968,7 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, dou
         if (tmr_box_dist2(t, i, p) > least) continue;
         if (i < t->leaves - 1) { /* the nearer one first */
             const int distant = tmr_box_dist2(t, 2 * i + 1, p) < tmr_box_dist2(t, 2 * i + 2, p);
+            TRIMESH_ASSERT(size + 2 <= TMR_TREE_DEPTH);
             stack[size++] = 2 * i + 1 + distant;
             stack[size++] = 2 * i + 2 - distant;
             continue;

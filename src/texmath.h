@@ -41,7 +41,9 @@
      }
 
    CONFIGURATION
-     None. Every function is static inline, there is no implementation section: include the file
+     TXM_ASSERT(x)          checks for errors in the library, which no input can trigger; default
+                            assert of <assert.h>
+     Every function is static inline, there is no implementation section: include the file
      wherever it is needed, in C99 or later and in C++11 or later, and link the math library.
 
    CONVENTIONS

@@ -102,7 +102,7 @@ typedef struct txe_sample {
 typedef struct txe_roughness {
     txe_sample *samples;
     size_t *starts;
-    size_t count, start_count;
+    size_t count, start_count, most; /* filled, and room for                                    */
     double amount;          /* factor of the exemplar's roughness                               */
     double step;            /* mean of all steps                                                */
     double share[TXE_BINS]; /* histogram of the directions of the exemplar's edges, sum 1       */
@@ -200,6 +200,7 @@ static int txe_measure_run(txe_roughness *u, const txe_scratch *scratch, size_t 
     for (size_t i = trim; i < end; i++) {
         const size_t at = i % m, back = (i + m - TXE_CHORD) % m, front = (i + TXE_CHORD) % m;
         const double dx = line[at].x - course[at].x, dy = line[at].y - course[at].y;
+        TXM_ASSERT(u->count < u->most);
         txe_sample *s = &u->samples[u->count];
         txe_direction(course[back], course[front], &direction);
         s->step = txe_distance(course[at], course[(i + 1) % m]);
@@ -280,6 +281,7 @@ static txm_status txe_measure_layer(txe_roughness *u, const texedges_set *e, int
         if (line->count > longest) longest = line->count;
     }
     if (most == 0) return TXM_OK;
+    u->most = most; /* m samples of n points of a line, m at most n + 1; closed ones go on for room */
     u->samples = (txe_sample *)txm_arena_alloc(arena, most, sizeof *u->samples);
     u->starts = (size_t *)txm_arena_alloc(arena, most, sizeof *u->starts);
     txe_scratch_make(&scratch, arena, longest + room);

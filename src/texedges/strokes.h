@@ -155,7 +155,10 @@ static size_t txe_cut_loops(txm_vec2 *points, size_t n, txm_vec2 *scratch, txe_p
                 scratch[top++] = at;
                 k = 1;
             }
-            if (i < n) scratch[top++] = next;
+            if (i < n) {
+                TXM_ASSERT(top < n); /* each point is pushed once, a crossing replaces two or more */
+                scratch[top++] = next;
+            }
             if (txe_advance(bar, TXE_LOOP)) return 0;
         }
         n = top;

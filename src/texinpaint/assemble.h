@@ -122,6 +122,7 @@ static int txi_expansion_region(txi_assembly *t, int32_t alpha, int reach) {
                 if (l->state[q] != TXI_HOLE || t->node[q] >= 0 || t->label[q] == TXI_LABEL_STRIP)
                     continue;
                 t->node[q] = 0;
+                TXM_ASSERT(count < l->hole_count);
                 t->region[count++] = q;
                 if (x < low[0]) low[0] = x;
                 if (y < low[1]) low[1] = y;

@@ -66,6 +66,7 @@ static int txi_proposals(const txi_canvas *t, int p, txi_proposal *list) {
             const txi_source *s = &l->source[m->pose];
             list[count].color =
                 s->color + 4 * ((size_t)(m->y + y) * (size_t)s->width + (size_t)(m->x + x));
+            TXM_ASSERT(count < TXI_PATCH_AREA);
             list[count++].anchor = a;
         }
     }

@@ -260,6 +260,7 @@ static int txi_belief_order(txi_beliefs *t) {
                 const int m = txi_other_end(g, t->arm[i], n);
                 if (!t->is_free[m] || t->parent[m] != -2) continue;
                 t->parent[m] = t->arm[i];
+                TXM_ASSERT(count < g->node_count);
                 t->order[count++] = m;
             }
         }

@@ -306,6 +306,7 @@ static txm_status txi_strips_graph(txi_strips *all, int profiles, const txi_line
             if (k == 0) continue;
             all->ends[2 * link] = node - 1;
             all->ends[2 * link + 1] = node;
+            TXM_ASSERT(link < all->link_count);
             all->link_strip[link++] = i;
         }
     }

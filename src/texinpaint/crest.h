@@ -145,10 +145,12 @@ static void txi_crest_links(const txi_shape *s, const uint32_t *node, txi_crest_
             if (node[s->edge[3 * f + i]] != UINT32_MAX) n[count++] = node[s->edge[3 * f + i]];
         }
         if (count == 2) {
+            TXM_ASSERT(links < net->link_count);
             net->link[2 * links] = n[0];
             net->link[2 * links++ + 1] = n[1];
         } else if (count == 3) {
             txm_dvec3 sum = txm_d3(0, 0, 0);
+            TXM_ASSERT(centre < net->node_count && links + 3 <= net->link_count);
             net->k[centre] = net->sharp[centre] = 0;
             for (int i = 0; i < 3; i++) {
                 sum = txm_d3_add(sum, net->place[n[i]]);

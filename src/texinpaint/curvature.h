@@ -127,6 +127,7 @@ static void txi_shape_orient(const txm_mesh *mesh, const uint32_t *next, uint32_
                 flip[g] = (uint8_t)(flip[queue[i]] ^ (txm_mesh_runs_down(mesh, side) ==
                                                       txm_mesh_runs_down(mesh, other)));
                 turned += flip[g];
+                TXM_ASSERT(count < mesh->face_count);
                 queue[count++] = (uint32_t)g;
             }
         }

@@ -92,6 +92,7 @@ static size_t txi_row_pattern(const txi_factor *f, uint32_t k) {
     for (uint32_t e = f->up_first[k]; e < f->up_first[k + 1]; e++) {
         size_t length = 0;
         for (uint32_t i = f->up_row[e]; f->flag[i] != k; i = f->parent[i]) {
+            TXM_ASSERT(length < f->count);
             f->path[length++] = i;
             f->flag[i] = k;
         }

@@ -44,6 +44,7 @@ static void txi_flat_edges(txi_flat *flat, uint32_t *first, uint32_t *sides, uin
             if (seen[other] != v) {
                 seen[other] = v;
                 seen_edge[other] = (uint32_t)flat->edge_count;
+                TXM_ASSERT(flat->edge_count < count);
                 flat->low[flat->edge_count] = v;
                 flat->high[flat->edge_count++] = other;
             }

@@ -195,6 +195,7 @@ typedef struct txi_links {
 
 static void txi_links_add(txi_links *links, int64_t texel, double weight) {
     if (texel < 0 || !(weight > 0)) return;
+    TXM_ASSERT(links->count < TXI_LINKS_MOST);
     links->texel[links->count] = (uint32_t)texel;
     links->weight[links->count++] = weight;
 }
@@ -362,7 +363,9 @@ static txm_status txi_graph_make(const txi_domain *d, const uint8_t *marks, txm_
     if (arena->failed) return txi_no_memory(env);
     for (size_t i = 0; i < texels; i++) {
         node[i] = (uint32_t)count;
-        if (marks[i] == TXI_NODE_UNKNOWN) g->texel[count++] = (uint32_t)i;
+        if (marks[i] != TXI_NODE_UNKNOWN) continue;
+        TXM_ASSERT(count < g->count);
+        g->texel[count++] = (uint32_t)i;
     }
     txi_graph_pass(d, marks, node, 0, g, total);
     if (total[0] > UINT32_MAX || total[1] > UINT32_MAX)
@@ -394,6 +397,7 @@ static void txi_graph_spread(const txi_texel_graph *g, uint32_t from, uint32_t *
         for (uint32_t l = g->first[queue[k]]; l < g->first[queue[k] + 1]; l++) {
             if (!mark[g->to[l]]) continue;
             mark[g->to[l]] = 0;
+            TXM_ASSERT(count < g->count);
             queue[count++] = g->to[l];
         }
     }

@@ -242,6 +242,7 @@ static txm_status txi_nearest_known(const txi_domain *d, const txi_texel_graph *
             if (queued[j]) continue;
             queued[j] = 1;
             const size_t end = head + waiting;
+            TXM_ASSERT(waiting < g->count);
             queue[end < g->count ? end : end - g->count] = j;
             waiting++;
         }

@@ -66,6 +66,7 @@ static double txi_link_energy(txi_pairing *m, int k) {
 }
 
 static void txi_activate(txi_pairing *m, int k) {
+    TXM_ASSERT(m->active_count < m->link_count);
     m->slot[k] = m->active_count;
     m->active[m->active_count++] = k;
     m->chosen[m->links[k].a] = k;
@@ -371,7 +372,9 @@ static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *mat
         const txm_status status =
             txi_curve_make(pairs, &match->links[k], dense, dense + room, room, arena, env, &c);
         if (status != TXM_OK) return status;
-        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+        if (c.first < 0 || c.last <= c.first) continue;
+        TXM_ASSERT(*count < l->end_count); /* an end has one curve at most */
+        curves[(*count)++] = c;
     }
     const int whole = *count;
     for (int e = 0; e < l->end_count; e++) {
@@ -384,7 +387,9 @@ static txm_status txi_join_curves(const txi_pairs *pairs, const txi_pairing *mat
         if (!txi_meet_curve(l, &l->ends[e], curves, whole, 0.75 * l->width, &k)) continue;
         const txm_status status = txi_curve_make(pairs, &k, dense, dense + room, room, arena, env, &c);
         if (status != TXM_OK) return status;
-        if (c.first >= 0 && c.last > c.first) curves[(*count)++] = c;
+        if (c.first < 0 || c.last <= c.first) continue;
+        TXM_ASSERT(*count < l->end_count);
+        curves[(*count)++] = c;
     }
     return TXM_OK;
 }

@@ -316,6 +316,7 @@ static txm_status txi_sheet_alone(txi_sheet *l, txm_arena *arena, txi_window *w)
         target.y = txm_float(y);
         target.axis = txm_v2(1, 0);
         target.mirrored = 0;
+        TXM_ASSERT(w->target_count < count);
         w->targets[w->target_count++] = target;
     }
     return TXM_OK;

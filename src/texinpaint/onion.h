@@ -137,7 +137,9 @@ static void txi_onion_list(txi_onion *o, const uint8_t *ring, int share) {
         int covers = 0;
         for (int k = 0; !covers && k < TXI_PATCH_AREA; k++)
             covers = ring[p + k / TXI_PATCH * l->width + k % TXI_PATCH];
-        if (covers) o->todo[o->todo_count++] = a;
+        if (!covers) continue;
+        TXM_ASSERT(o->todo_count < l->anchor_count);
+        o->todo[o->todo_count++] = a;
     }
 }
 
@@ -176,7 +178,9 @@ static int txi_onion_fill(const txi_onion *o, const uint8_t *ring, uint8_t *curr
             least = d;
             memcpy(t->color + 4 * (size_t)p, color[k], 3);
         }
-        if (n) o->todo[l->anchor_count + filled++] = p;
+        if (!n) continue;
+        TXM_ASSERT(filled < l->hole_count);
+        o->todo[l->anchor_count + filled++] = p;
     }
     for (int k = 0; k < filled; k++)
         memset(o->known + 4 * (size_t)o->todo[l->anchor_count + k], 255, 4);

@@ -415,6 +415,7 @@ static int txi_look_ahead(const txi_pairs *pairs, int a, txi_link *k) {
         }
         if (fabs(best) < 6.5) {
             if (!hits) first = beyond;
+            TXM_ASSERT(hits < TXI_LOOK_AHEAD);
             offsets[hits++] = best;
         }
         beyond++;

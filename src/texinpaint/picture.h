@@ -225,10 +225,14 @@ static int txi_level_lists(txi_level *l, txm_arena *arena) {
             l->hole_row[p / w] = h;
             l->anchor_row[p / w] = a;
         }
-        if (l->state[p] == TXI_HOLE) l->hole[h++] = p;
+        if (l->state[p] == TXI_HOLE) {
+            TXM_ASSERT(h < l->hole_count);
+            l->hole[h++] = p;
+        }
         if (!touch[p]) continue;
         l->slot[p] = a;
         l->filled[a] = touch[p];
+        TXM_ASSERT(a < l->anchor_count);
         l->anchor[a++] = p;
     }
     l->hole_row[l->height] = h;

@@ -188,6 +188,7 @@ static int txi_level_sources(txi_level *l, int is_picture, int pose_count, const
         s->color = (uint8_t *)txm_arena_alloc(arena, n, 4);
         s->usable = (uint8_t *)txm_arena_alloc(arena, n, 1);
         s->worth = (uint16_t *)txm_arena_alloc(arena, n, sizeof(uint16_t));
+        TXM_ASSERT(count < TXI_MAX_POSES);
         task.pose[count] = pose;
         task.numbers[count] = (uint32_t *)txm_arena_alloc(&scratch, n, 2 * sizeof(uint32_t));
         task.columns[count++] =

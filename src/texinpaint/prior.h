@@ -80,6 +80,7 @@ static int txi_prior_add(txi_prior_list *list, txm_vec2 p, txm_arena *arena) {
             if (!txi_prior_reserve(list, 1, arena)) return 0;
         }
     }
+    TXM_ASSERT((size_t)list->open < list->point_room);
     list->points[list->open++] = p;
     return 1;
 }

@@ -86,6 +86,7 @@ static void txi_nearest_marks(const uint8_t *marks, int width, int height, int32
                 count--;
             }
             if (begin >= width) continue;
+            TXM_ASSERT(count < width);
             stack[count] = x;
             from[count++] = begin;
         }

@@ -109,6 +109,7 @@ static txm_status txi_weld(const txm_mesh *mesh, txi_surface *s, uint32_t *weld,
         }
         if (table[slot] == UINT32_MAX) {
             table[slot] = (uint32_t)s->vertex_count;
+            TXM_ASSERT(s->vertex_count < mesh->vertex_count);
             s->point[s->vertex_count++] = txm_d3_load(p);
         }
         weld[v] = table[slot];

@@ -250,6 +250,7 @@ static int txi_follow(const txi_lines *l, const txi_thin *from, txm_vec2 inwards
         if (at < 0) return 0;
         txi_change_at(f, (size_t)at, -k.dy, k.dx, k.change);
         if (way == 1) {
+            TXM_ASSERT(inner < capacity);
             while (inner > 0) points[n++] = back[--inner];
             points[n++] = from->place;
         }

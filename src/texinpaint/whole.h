@@ -111,6 +111,7 @@ static int txi_flank_make(const txi_window *w, const txi_curve *c, int end, int 
         const int point = txi_flank_point(c, end, i);
         if (point < 0) break;
         const double width = txi_flank_width(w, c, point, side, f->color, differs);
+        TXM_ASSERT(n < TXI_FLANK_KNOWN);
         if (width > 0) widths[n++] = width;
         others = width < 0 ? others + 1 : 0;
     }

@@ -207,6 +207,7 @@ static inline void txm_bleed_begin(txm_bleed *b, const txm_image *image, int wra
     b->lanes = image->channels;
     b->pixels = (double)width * height;
     do {
+        TXM_ASSERT(b->levels + 1 < TXM_BLEED_LEVELS);
         txm_bleed_level *to = &b->level[++b->levels];
         to->width = width = width / 2 + width % 2;
         to->height = height = height / 2 + height % 2;

@@ -537,6 +537,7 @@ static inline void txm_uneven_basis(txm_uneven_grid *g) {
             if (!(after > 1e-9 * before)) continue;
             const double scale = sqrt(g->cells / after);
             for (int i = 0; i < TXM_UNEVEN_COUNT; i++) f[i] *= scale;
+            TXM_ASSERT(g->functions < (int)(sizeof g->degree / sizeof *g->degree));
             g->degree[g->functions++] = degree;
         }
     }

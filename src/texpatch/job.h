@@ -76,11 +76,18 @@ static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_o
     memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof(float));
 }
 
+/* The next step; there is room for two windows on all levels, 16 passes each, the quilt, polishing twice
+   and the finish. */
+static txp_step *txp_add_step(texpatch_job *job) {
+    TXM_ASSERT(job->step_count < TXP_MAX_STEPS);
+    return &job->steps[job->step_count++];
+}
+
 static void txp_setup_steps(texpatch_job *job) {
     const txp_source *s = job->source;
     const int top = s->levels - 1, passes = job->setup.passes;
     job->step_count = job->next_step = 0;
-    txp_step *t = &job->steps[job->step_count++];
+    txp_step *t = txp_add_step(job);
     t->kind = TXP_STEP_QUILT;
     t->level = top;
     t->cost = 1;
@@ -88,7 +95,7 @@ static void txp_setup_steps(texpatch_job *job) {
         for (int half = 0; half < 2; half++) {
             const int count = l == 0 && job->setup.is_default ? 2 : passes;
             for (int i = 0; i < count; i++) {
-                t = &job->steps[job->step_count++];
+                t = txp_add_step(job);
                 t->kind = TXP_STEP_PASS;
                 t->level = l;
                 t->round = i;
@@ -100,13 +107,13 @@ static void txp_setup_steps(texpatch_job *job) {
         }
     }
     for (int i = 0; i < 2 && passes > 0; i++) {
-        t = &job->steps[job->step_count++];
+        t = txp_add_step(job);
         t->kind = TXP_STEP_POLISH;
         t->level = 0;
         t->round = i;
         t->cost = 0.2f;
     }
-    t = &job->steps[job->step_count++];
+    t = txp_add_step(job);
     t->kind = TXP_STEP_FINISH;
     t->level = 0;
     t->cost = 0.5f;

@@ -492,7 +492,9 @@ static void txp_polish_band(void *context, int index) {
                 int known = 0;
                 for (int t = 0; t < count && !known; t++)
                     known = tried[t].x == at.x && tried[t].y == at.y;
-                if (!known) tried[count++] = at;
+                if (known) continue;
+                TXM_ASSERT(count < 9); /* the own one and those of 8 neighbours */
+                tried[count++] = at;
             }
             if (count == 1) continue;
             /* the 5 x 5 pixels around it, moved inwards at borders that do not wrap */

@@ -231,6 +231,7 @@ static void txp_sheets(const txp_setup *u, txp_source *s, const double *stretch)
         const int w = u->maps[e][0].width, h = u->maps[e][0].height;
         for (int m = 0; m <= (u->mirror ? 1 : 0); m++) {
             for (int t = 0; t < 4; t += 4 / u->turns) {
+                TXM_ASSERT(s->sheets < TXP_MAX_SHEETS);
                 txp_sheet *k = &s->sheet[s->sheets++];
                 k->exemplar = e;
                 k->turn = t + 4 * m;

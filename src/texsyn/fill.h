@@ -186,6 +186,7 @@ static txs_hole txs_take_cells(uint8_t *cell, int width, int height, int32_t *st
             const int nx = x + k % 3 - 1, ny = y + k / 3 - 1;
             if (nx < 0 || ny < 0 || nx >= width || ny >= height || !cell[ny * width + nx]) continue;
             cell[ny * width + nx] = 0;
+            TEXSYN_ASSERT(count < width * height);
             stack[count++] = ny * width + nx;
         }
     }

@@ -242,6 +242,7 @@ static int txs_move_tries(txs_laying *l) {
     }
     for (int k = 0; k < TXS_FINALISTS; k++) {
         for (int i = 0; i < TXS_MOVED; i++) {
+            TEXSYN_ASSERT(count < TXS_TRIES);
             txs_place_of *p = &l->tries[count++];
             const int side = 2 * TXS_MOVES + 1;
             *p = finalists[k];

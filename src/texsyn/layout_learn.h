@@ -203,6 +203,7 @@ static int txs_lay_add_worst(txs_lay_level *l, const txs_lay_view *source, const
             if (distance[i] > distance[worst]) worst = i;
         if (count == 0 || !(distance[worst] > threshold)) break;
         const txs_lay_type chosen = candidates[worst];
+        TEXSYN_ASSERT(l->type_count < TXS_LAY_TYPES);
         l->types[l->type_count++] = chosen;
         for (int i = 0; i < count; i++) /* its neighbours say the same */
             if (abs(candidates[i].dx - chosen.dx) <= 1 && abs(candidates[i].dy - chosen.dy) <= 1)

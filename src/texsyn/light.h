@@ -148,6 +148,7 @@ static double txs_limit(double x, double low, double high) {
 }
 
 static void txs_add_knot(texsyn_light *l, double from, double to) {
+    TEXSYN_ASSERT(l->knots < (int)(sizeof l->from / sizeof *l->from));
     l->from[l->knots] = txm_float(from);
     l->to[l->knots++] = txm_float(to);
 }

@@ -219,6 +219,7 @@ static txs_guard txs_guard_make(const txs_mosaic *m, const txs_type *t, int labe
     for (int i = 0; i < members; i++) {
         const int is_parent = t->kind == TEXSYN_SCALE && i >= 2;
         if (i == member) continue;
+        TEXSYN_ASSERT(g.count < (int)(sizeof g.at / sizeof *g.at));
         g.at[g.count++] = (at[i][1] - at[member][1]) * m->canvas.stride + at[i][0] - at[member][0] +
                           (is_parent ? m->parent : labels);
     }

@@ -132,6 +132,7 @@ static void txs_part_add_crossing(txs_brush *s, int label, int far_, int band, i
         e->o1 = far_band * s->mosaic->canvas.plane + d;
         e->classes = s->texture[far_].level->classes[far_band];
         e->table = table;
+        TEXSYN_ASSERT(g->count < (int)(sizeof g->at / sizeof *g->at));
         g->at[g->count++] = s->mosaic->label + d;
         g->label = far_;
         part->cross_count[band]++;

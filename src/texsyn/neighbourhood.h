@@ -149,6 +149,7 @@ static txs_stencil txs_stencil_of(const txs_learner *a, const txs_type *t) {
 }
 
 static txs_type *txs_add_type(txs_level *l, int kind, int band, int other, int dx, int dy) {
+    TEXSYN_ASSERT(l->type_count < TXS_MAX_TYPES);
     txs_type *t = &l->types[l->type_count++];
     memset(t, 0, sizeof *t);
     t->kind = kind;

@@ -262,6 +262,7 @@ static void txt_list_features(txt_build *b) {
         const int n = b->set->maps[m].channels;
         if (m && b->features + n > TXT_MAX_FEATURES) continue;
         for (int c = 0; c < n; c++) {
+            TXM_ASSERT(b->features < TXT_MAX_FEATURES);
             b->feature_map[b->features] = m;
             b->feature_channel[b->features++] = c;
         }

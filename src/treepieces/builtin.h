@@ -15,6 +15,7 @@ typedef struct tpc_shape {
 /* A vertex with weight `own` for the piece's own bone; the rest is shared evenly by the leaf rims
    of the bit mask `leaves`. */
 static int tpc_add_vertex(tpc_shape *s, float x, float y, float z, float own, int leaves) {
+    TXM_ASSERT(s->piece.vertex_count < (int)(sizeof s->vertices / sizeof *s->vertices));
     treepieces_vertex *v = &s->vertices[s->piece.vertex_count];
     const int count = (leaves & 1) + (leaves >> 1 & 1) + (leaves >> 2 & 1);
     memset(v, 0, sizeof *v);
@@ -76,6 +77,7 @@ static const int *tpc_add_leaf_rim(tpc_shape *s, float x, float y, float z, doub
 
 static void tpc_add_quad(tpc_shape *s, int nw, int sw, int se, int ne, treepieces_class c,
                          int band) {
+    TXM_ASSERT(s->piece.quad_count < (int)(sizeof s->quads / sizeof *s->quads));
     treepieces_quad *q = &s->quads[s->piece.quad_count++];
     q->corners[0] = (uint8_t)nw;
     q->corners[1] = (uint8_t)sw;

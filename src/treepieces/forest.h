@@ -79,6 +79,7 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->desc = p->desc;
         g->kit = p->desc->kit;
         g->most = most;
+        /* a tree has at most `most` nodes; each was a bud once, and has one cluster at most */
         g->nodes = (treepieces_node *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->nodes);
         g->bands = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->bands);
         g->records = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->records);

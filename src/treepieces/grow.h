@@ -459,6 +459,7 @@ static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_ch
 }
 
 static void tpc_add_cluster(tpc_growth *g, int type) {
+    TXM_ASSERT(g->cluster_count < g->most);
     treepieces_cluster *c = &g->clusters[g->cluster_count++];
     c->node = (uint32_t)(g->node_count - 1);
     c->along = type == TREEPIECES_TIP ? 0.7f : tpc_uniform(g, 0.2f, 1);
@@ -533,6 +534,7 @@ static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choic
     if (!p->leaf_count) return;
 
     for (int k = 0; k < p->leaf_count; k++) {
+        TXM_ASSERT(g->bud_count < g->most); /* each becomes a node, see tpc_grow */
         tpc_bud *next = &g->buds[g->bud_count];
         *next = *bud;
         next->seed = txm_hash(bud->seed + (uint64_t)(k + 1) * 0x9e3779b97f4a7c15u);

@@ -158,6 +158,7 @@ static txm_status tpc_check_fans(const treepieces_piece *p, int index, txm_env *
             const uint8_t *c = p->quads[i].corners;
             for (int k = 0; k < 4; k++) {
                 if (c[k] != v) continue;
+                TXM_ASSERT(count < TREEPIECES_MAX_QUADS);
                 from[count] = c[(k + 1) % 4];
                 to[count++] = c[(k + 3) % 4];
             }
@@ -319,6 +320,7 @@ static txm_status tpc_add_piece(treepieces_kit *kit, const treepieces_piece *fro
     tpc_cells *cells = (tpc_cells *)txm_arena_zero(&kit->arena, (quads + 3) / 4, sizeof *cells);
     if (kit->arena.failed)
         return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece");
+    TXM_ASSERT(kit->count < TREEPIECES_MAX_TYPES);
     treepieces_piece *p = &kit->pieces[kit->count];
     *p = *from;
     memcpy(v, from->vertices, vertices * sizeof *v);

@@ -49,6 +49,7 @@ static void tmc_breadth_first(const uint32_t *next, size_t triangles, uint8_t *s
                 for (size_t s = next[side]; s != side; s = next[s]) {
                     if (seen[s / 3]) continue;
                     seen[s / 3] = 1;
+                    TXM_ASSERT(end < triangles);
                     order[end++] = (uint32_t)(s / 3);
                 }
             }

@@ -98,6 +98,7 @@ static txm_status tmr_list_ends(const tmr_surface *s, txm_arena *arena, tmr_ends
     }
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         if (s->edge_kind[c] == TMR_PLAIN_EDGE || !tmr_represents_edge(s, c)) continue;
+        TRIMESH_ASSERT(count[s->vertex[tmr_next(c)]] < total && count[s->vertex[tmr_prev(c)]] < total);
         ends->corner[count[s->vertex[tmr_next(c)]]++] = c;
         ends->corner[count[s->vertex[tmr_prev(c)]]++] = c;
     }
@@ -127,6 +128,7 @@ static txm_status tmr_drop_short_lines(tmr_surface *s, const tmr_ends *ends, dou
                 length += 0.5 * txm_d3_dist(s->point[u], s->point[w]);
                 if (!seen[w]) {
                     seen[w] = 1;
+                    TRIMESH_ASSERT(size < n);
                     stack[size++] = w;
                 }
             }

@@ -372,6 +372,7 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
             const int32_t g = m->opposite[c] < 0 ? f : m->opposite[c] / 3;
             if (!m->twin[g] || m->flag[g]) continue;
             m->flag[g] = 1;
+            TRIMESH_ASSERT(top < m->face_count);
             m->list[top++] = g;
         }
     }

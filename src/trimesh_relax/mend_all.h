@@ -43,6 +43,7 @@ static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, i
         s->normal[f] = txm_d3_unit(n);
         if (tmr_is_thin(m, p)) {
             s->normal[f] = txm_d3(0, 0, 0);
+            TRIMESH_ASSERT(*count < s->face_count);
             thin[(*count)++] = f;
         }
     }
@@ -80,6 +81,7 @@ static void tmr_find_components(tmr_surface *s, int32_t *queue) {
                 const int32_t g = s->opposite[c] / 3;
                 if (s->opposite[c] < 0 || s->component[g] >= 0) continue;
                 s->component[g] = s->component_count;
+                TRIMESH_ASSERT(count < s->face_count);
                 queue[count++] = g;
             }
         }

@@ -28,6 +28,7 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
             const uint8_t want = (uint8_t)(alike ? m->flag[f] : 3 - m->flag[f]);
             if (m->flag[g] == 0) {
                 m->flag[g] = want;
+                TRIMESH_ASSERT(count < m->face_count);
                 m->list[count++] = g;
             } else if (m->flag[g] != want) {
                 *bad = c;

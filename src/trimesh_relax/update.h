@@ -80,11 +80,13 @@ static double tmr_box_dist2(const tmr_tree *t, int32_t i, txm_dvec3 p) {
     return x * x + y * y + z * z;
 }
 
+enum { TMR_TREE_DEPTH = 64 }; /* each level leaves one node on the stack: of 2^31 at most 31, and one */
+
 /* The triangle nearest to p within reach whose normal agrees with n to the cosine `agree`; -1:
    none. *at: the place on it. */
 static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, double agree,
                                 double reach, tmr_place *at) {
-    int32_t stack[64], size = 0, best = -1;
+    int32_t stack[TMR_TREE_DEPTH], size = 0, best = -1;
     double least = reach * reach;
     stack[size++] = 0;
     while (size > 0) {
@@ -92,6 +94,7 @@ static int32_t tmr_tree_nearest(const tmr_tree *t, txm_dvec3 p, txm_dvec3 n, dou
         if (tmr_box_dist2(t, i, p) > least) continue;
         if (i < t->leaves - 1) { /* the nearer one first */
             const int distant = tmr_box_dist2(t, 2 * i + 1, p) < tmr_box_dist2(t, 2 * i + 2, p);
+            TRIMESH_ASSERT(size + 2 <= TMR_TREE_DEPTH);
             stack[size++] = 2 * i + 1 + distant;
             stack[size++] = 2 * i + 2 - distant;
             continue;
