@@ -10,10 +10,9 @@
 #include "faults.h"
 
 #define FUZZ_BYTES 8
-#include "fuzzkit.h"
+#include "soupkit.h"
 
-enum { MOST_SIDE = 56, MOST_PIXELS = MOST_SIDE * MOST_SIDE, MOST_MAPS = 3, MOST_VERTICES = 200,
-       MOST_FACES = 300 };
+enum { MOST_SIDE = 56, MOST_PIXELS = MOST_SIDE * MOST_SIDE, MOST_MAPS = 3 };
 
 typedef struct input {
     texinpaint_desc desc;
@@ -124,7 +123,8 @@ static void add_sheet(source *s, int n, int m, float angle, float left, float to
 }
 
 static void draw_mesh(source *s) {
-    const int kind = pick(s, 6);
+    static soup m;
+    const int kind = pick(s, 8);
     if (kind < 2) return; /* a picture */
     if (kind == 2) {
         add_sheet(s, 1 + pick(s, 8), 1 + pick(s, 8), 0.9f * (float)pick(s, 7), 0.05f, 0.05f, 0.9f);
@@ -132,6 +132,15 @@ static void draw_mesh(source *s) {
         for (int i = 1 + pick(s, 4); i > 0; i--)
             add_sheet(s, 1 + pick(s, 3), 1 + pick(s, 3), 0, 0.25f * (float)(pick(s, 9) - 2),
                       0.25f * (float)(pick(s, 9) - 2), 0.25f * (float)(pick(s, 7) - 3));
+    } else if (kind > 5) { /* a soup, laid out flat or anyhow */
+        const int flat = pick(s, 3);
+        make_soup(&m, s);
+        for (size_t i = 0; i < m.vertices; i++) {
+            const float *p = m.positions + 3 * i;
+            add_vertex(p[0], p[1], p[2], flat ? 0.3f + 0.3f * p[0] : unit(s), flat ? 0.3f + 0.3f * p[1] : unit(s));
+        }
+        for (size_t f = 0; f < m.faces; f++)
+            add_face(m.indices[3 * f], m.indices[3 * f + 1], m.indices[3 * f + 2]);
     } else { /* anything */
         for (int i = 3 + pick(s, 12); i > 0; i--)
             add_vertex((float)pick(s, 3), (float)pick(s, 3), kind == 4 ? 0 : unit(s), unit(s), unit(s));
@@ -139,6 +148,7 @@ static void draw_mesh(source *s) {
             add_face((uint32_t)pick(s, (int)in.vertices), (uint32_t)pick(s, (int)in.vertices),
                      (uint32_t)pick(s, (int)in.vertices));
     }
+    if (in.vertices == 0 || in.faces == 0) return;
     /* one of these, one time in two */
     const float scales[6] = {1e-30f, 1e-6f, 1e6f, 1e18f, 3e38f, 0};
     const size_t v = (size_t)pick(s, (int)in.vertices), f = (size_t)pick(s, (int)in.faces);
