@@ -7,7 +7,7 @@
 set -eu
 
 profile=${1:?usage: setup.sh tool|demo|test|lint|ci}
-missing=
+missing= wanted=
 
 has_header() { echo "#include <$1>" | ${CC:-cc} -E -xc - >/dev/null 2>&1; }
 has_cxx_header() { find /usr/include /usr/local/include -path "*/$1" 2>/dev/null | grep -q .; }
@@ -20,8 +20,10 @@ has_command() { command -v "$1" >/dev/null 2>&1; }
 # a module of Debian's own python3, another python3 may come first in the path
 has_python() { has_command /usr/bin/python3 && has_file "/usr/lib/python3*/*-packages/$1"; }
 
-# need TEST NAME PACKAGE: unless the test finds the name, the Debian package is missing
+# need TEST NAME PACKAGE...: unless the test finds the name, the Debian packages are missing
 need() { "$1" "$2" || missing="$missing $3"; }
+# want: the same for what can be done without
+want() { "$1" "$2" || { shift 2 && wanted="$wanted $*"; }; }
 
 need has_header stb/stb_image.h libstb-dev
 need has_header cjson/cJSON.h libcjson-dev
@@ -64,29 +66,46 @@ case $profile in ci)
     need has_command llvm-symbolizer llvm
     need has_command pkg-config pkg-config
     need has_command chromium chromium # runs three.js
+    # compilers for other machines and what runs their programs, for tests/wide/machines.sh
+    want has_command s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross
+    want has_command aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross
+    want has_command i686-linux-gnu-gcc gcc-i686-linux-gnu libc6-dev-i386-cross
+    want has_command x86_64-w64-mingw32-gcc gcc-mingw-w64-x86-64-win32
+    want has_command qemu-s390x qemu-user
+    want has_command wine wine wine64
 esac
-[ -n "$missing" ] || exit 0
+[ -n "$missing$wanted" ] || exit 0
 
 give_up() {
     echo "setup: $1; please install what these Debian packages hold:$missing" >&2
     exit 1
 }
-has_command apt-get || give_up "no apt-get here"
+if ! has_command apt-get; then
+    [ -n "$missing" ] || exit 0
+    give_up "no apt-get here"
+fi
 root=
 if [ "$(id -u)" != 0 ]; then
-    has_command sudo || give_up "not root, and no sudo here"
+    has_command sudo || { [ -n "$missing" ] || exit 0; give_up "not root, and no sudo here"; }
     if [ -t 0 ]; then root=sudo; else root="sudo -n"; fi
 fi
 
-echo "setup: installing$missing"
+# install PACKAGES
 install() {
-    # shellcheck disable=SC2086 # the words of $root and $missing are meant to be split
+    # shellcheck disable=SC2086 # the words of $root and of the packages are meant to be split
     $root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends install \
-        $missing </dev/null >"$log" 2>&1
+        $1 </dev/null >"$log" 2>&1
+}
+# or after an update of the list of packages
+install_or_update() {
+    echo "setup: installing$1"
+    install "$1" || { $root apt-get -qq update >/dev/null 2>&1 || true; install "$1"; }
 }
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-install || { $root apt-get -qq update >/dev/null 2>&1 || true; install; } || {
+[ -z "$missing" ] || install_or_update "$missing" || {
     tail -n 5 "$log" >&2
     give_up "apt-get could not install them"
 }
+[ -z "$wanted" ] || install_or_update "$wanted" ||
+    echo "setup: going on without$wanted, which apt-get could not install"

@@ -6,6 +6,7 @@
 #
 #   compare.sh --write PROGRAM...    writes golden.txt anew, on purpose: the commit says why
 #   compare.sh --tap CASES...        with a line "ok - " or "not ok - " for each
+#   compare.sh --some CASES...       the same for programs that are asked for some cases only
 set -u
 golden=$(dirname "$0")/golden.txt
 
@@ -15,8 +16,9 @@ if [ "${1:-}" = --write ]; then
     exit
 fi
 
-status=0 tap=
-[ "${1:-}" = --tap ] && tap=yes && shift
+status=0 tap= some=
+[ "${1:-}" = --some ] && some=yes
+case ${1:-} in --tap | --some) tap=yes && shift ;; esac
 for run in "$@"; do
     same=yes
     # shellcheck disable=SC2086 # program and arguments
@@ -24,7 +26,11 @@ for run in "$@"; do
     module=$(echo "$lines" | sed -n '1s/ .*//p')
     [ -n "$module" ] && grep -q "^$module " "$golden" || { echo "$run: no such module"; same=no; }
     {
-        grep "^$module " "$golden"
+        if [ -n "$some" ]; then
+            for case in $(echo "$lines" | cut -d ' ' -f 2); do grep "^$module $case " "$golden"; done
+        else
+            grep "^$module " "$golden"
+        fi
         echo "$lines"
     } | awk -v run="$run" '
         { n[$1 " " $2]++; different[$1 " " $2] = n[$1 " " $2] > 1 && $3 != hash[$1 " " $2]

@@ -7,7 +7,7 @@
    which module and case differ.
 
        make build/golden/golden_texsyn
-       build/golden/golden_texsyn THREADS [CASE]     0: one thread, the indices of loops backwards
+       build/golden/golden_texsyn THREADS [CASE...]  0: one thread, the indices of loops backwards
        tests/wide/golden/compare.sh "build/golden/golden_texsyn 3"
 
    Inputs are made of integers and of what the C standard rounds exactly, so that libm has no part
@@ -47,11 +47,18 @@ static inline void golden_need(txm_status status, const char *what, const txm_en
     exit(1);
 }
 
+/* Is the case among those that are asked for? Without names all are. */
+static inline int golden_is_asked(int argc, char **argv, const char *name) {
+    for (int i = 2; i < argc; i++)
+        if (strcmp(argv[i], name) == 0) return 1;
+    return argc <= 2;
+}
+
 static inline int golden_main(int argc, char **argv, const char *module, const golden_case *cases,
                               int count) {
     int threads = argc > 1 ? atoi(argv[1]) : 1, printed = 0;
     for (int i = 0; i < count; i++) {
-        if (argc > 2 && strcmp(argv[2], cases[i].name) != 0) continue;
+        if (!golden_is_asked(argc, argv, cases[i].name)) continue;
         txm_env env;
         memset(&env, 0, sizeof env);
         if (threads == 0) env.parallel_for = tk_parallel_reverse;
@@ -65,7 +72,7 @@ static inline int golden_main(int argc, char **argv, const char *module, const g
         fflush(stdout);
         printed++;
     }
-    return printed ? 0 : 1;
+    return printed == (argc > 2 ? argc - 2 : count) ? 0 : 1;
 }
 
 /* main of a program whose cases stand in the array `cases` */
