@@ -180,7 +180,8 @@ typedef struct trimesh_desc {
                               edge and have different numbers at one of its ends, that edge is part
                               of a seam, which the result's edges follow as they follow creases; but
                               the surface is smooth there. Connected seams shorter than 3 edges of
-                              the result are left out. NULL = none                             */
+                              the result are left out, and so are those of one edge around the
+                              pole of a globe. NULL = none                                     */
     trimesh_report *report; /* out: receives what was found in the input, also after an error;
                               NULL = no report                                                  */
 } trimesh_desc;
@@ -1777,6 +1778,27 @@ static void tmr_trace(const tmr_surface *s, const tmr_ends *ends, tmr_lines *l, 
     l->first[id + 1] = l->segment_count;
 }
 
+/* Is this seam the only line at its end opposite to v? */
+static int tmr_is_spoke(const tmr_surface *s, const tmr_ends *ends, int32_t v, int32_t c) {
+    const int32_t w = tmr_other_end(s, c, v);
+    return s->edge_kind[c] == TMR_SEAM_EDGE && ends->first[w + 1] - ends->first[w] == 1;
+}
+
+/* At the pole of a globe each triangle has texture coordinates of its own, and all edges there are seams
+   that end at once: spokes, which are no cuts. Make plain those of vertices with two or more. */
+static void tmr_drop_spokes(tmr_surface *s, const tmr_ends *ends) {
+    for (int32_t v = 0; v < s->vertex_count; v++) {
+        int spokes = 0;
+        for (int32_t e = ends->first[v]; e < ends->first[v + 1]; e++)
+            spokes += tmr_is_spoke(s, ends, v, ends->corner[e]);
+        for (int32_t e = ends->first[v]; e < ends->first[v + 1] && spokes > 1; e++) {
+            const int32_t c = ends->corner[e];
+            if (!tmr_is_spoke(s, ends, v, c)) continue;
+            s->edge_kind[c] = s->edge_kind[s->opposite[c]] = TMR_PLAIN_EDGE;
+        }
+    }
+}
+
 /* Find creases and seams, and list the ends of the edges that stay. */
 static txm_status tmr_find_lines(tmr_surface *s, const trimesh_desc *desc, double angle,
                                  double spacing, txm_arena *scratch, tmr_ends *ends) {
@@ -1788,6 +1810,8 @@ static txm_status tmr_find_lines(tmr_surface *s, const trimesh_desc *desc, doubl
     }
     if (desc->seams) {
         tmr_mark_seams(s, desc);
+        if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
+        tmr_drop_spokes(s, ends);
         if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
         status = tmr_drop_short_lines(s, ends, TMR_SHORTEST_SEAM * spacing,
                                       TMR_BORDER_EDGE | TMR_CREASE_EDGE, scratch);

@@ -180,7 +180,8 @@ typedef struct trimesh_desc {
                               edge and have different numbers at one of its ends, that edge is part
                               of a seam, which the result's edges follow as they follow creases; but
                               the surface is smooth there. Connected seams shorter than 3 edges of
-                              the result are left out. NULL = none                             */
+                              the result are left out, and so are those of one edge around the
+                              pole of a globe. NULL = none                                     */
     trimesh_report *report; /* out: receives what was found in the input, also after an error;
                               NULL = no report                                                  */
 } trimesh_desc;

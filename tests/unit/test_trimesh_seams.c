@@ -186,6 +186,43 @@ static void test_cut(void **state) {
     }
 }
 
+/* A globe of n x n quads, whose triangles at a pole have entries of their own there: of the seams only
+   the cut from pole to pole is kept. */
+static void test_globe(void **state) {
+    enum { N = 24 };
+    (void)state;
+    in.vertices = in.triangles = 0;
+    for (int i = 1; i < N; i++) {
+        for (int j = 0; j < N; j++) {
+            const double a = TXM_PI * i / N, b = 2 * TXM_PI * j / N;
+            vertex(sin(a) * cos(b), sin(a) * sin(b), cos(a));
+        }
+    }
+    const uint32_t top = vertex(0, 0, 1), bottom = vertex(0, 0, -1);
+    for (int i = 0; i < N; i++) {
+        for (int j = 0; j < N; j++) {
+            const uint32_t up = (uint32_t)((i - 1) * N), low = up + N;
+            const uint32_t a = (uint32_t)j, b = (uint32_t)((j + 1) % N);
+            const size_t first = in.triangles;
+            if (i == 0) triangle(top, a, b);
+            else if (i == N - 1) triangle(up + a, bottom, up + b);
+            else quad(up + a, low + a, low + b, up + b);
+            for (size_t c = 3 * first; c < 3 * in.triangles; c++)
+                seams[c] = in.t[c] >= top ? 100000 + (uint32_t)c
+                           : j == N - 1 && in.t[c] % N == 0 ? 50000 + in.t[c] : in.t[c];
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        trimesh_report report;
+        trimesh_desc d = describe(300, both[k]);
+        d.report = &report;
+        trimesh_mesh *m = retile(&d);
+        assert_int_equal(report.seam_edges, N);
+        assert_false(crosses_cut(m));
+        trimesh_mesh_free(m);
+    }
+}
+
 /* On a box of six charts all seams are creases, too: the corners stay sharp, and normals differ. */
 static void test_box(void **state) {
     (void)state;
@@ -291,7 +328,7 @@ static void test_update(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ball),   cmocka_unit_test(test_none),
-        cmocka_unit_test(test_small_chart), cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_small_chart), cmocka_unit_test(test_cut), cmocka_unit_test(test_globe),
         cmocka_unit_test(test_box),    cmocka_unit_test(test_mended),
         cmocka_unit_test(test_faults), cmocka_unit_test(test_update),
     };
