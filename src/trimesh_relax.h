@@ -69,7 +69,7 @@
 
    LIMITS
      Uniform triangles cannot show detail that is finer than they are: ears thinner than an edge are
-     smoothed. Where that would leave crossings, edges become shorter there, or the call says that it
+     smoothed; volume_change of the mesh says what that costs. Where that would leave crossings, edges become shorter there, or the call says that it
      needs more vertices. A surface that crosses itself is accepted; its result may cross itself, too.
      Creases sharper than 120 degrees stay creases, so two triangles nearly face each other there.
      The number of vertices is exact; edge lengths follow from it.
@@ -126,6 +126,8 @@ typedef struct trimesh_mesh {
     int32_t *old_vertices;   /* of trimesh_update: 1 per vertex, which one of the old mesh it was,
                                 -1 = new; else NULL                                        */
     double edge_length;      /* the target length, in units of the input                   */
+    double volume_change;    /* the volume inside relative to the input's, minus 1: clearly below 0
+                                where parts are thinner than an edge; 0 for surfaces with a border */
     txm_arena memory;        /* private                                                    */
 } trimesh_mesh;
 
@@ -166,8 +168,9 @@ typedef struct trimesh_desc {
                               adaptation                                                        */
     float crease_angle;    /* smallest angle between the normals of two triangles, in degrees, at
                               which their edge may be a crease; 0 = 50; 180 = none. Below 75 it
-                              must also be clearly sharper than the edges around it. Connected
-                              creases shorter than 6 percent of the diagonal are left out       */
+                              must also be clearly sharper than the edges around it; between
+                              flats 0.6 of the angle is enough. Chamfers and fillets narrower than
+                              an edge become one crease. Connected creases shorter than 6 percent of the diagonal are left out       */
     float line_spacing;    /* edge length along creases and borders relative to that inside,
                               0.25..4; 0 = 1. Increased where lines would take more than half of
                               the vertices                                                      */
@@ -304,11 +307,13 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/mend_thin.h"
 #include "trimesh_relax/mend_all.h"
 #include "trimesh_relax/seams.h"
+#include "trimesh_relax/bands.h"
 #include "trimesh_relax/creases.h"
 #include "trimesh_relax/density.h"
 #include "trimesh_relax/mesh.h"
 #include "trimesh_relax/place.h"
 #include "trimesh_relax/work.h"
+#include "trimesh_relax/ridges.h"
 #include "trimesh_relax/relax.h"
 #include "trimesh_relax/collapse.h"
 #include "trimesh_relax/fields.h"

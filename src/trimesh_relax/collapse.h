@@ -127,8 +127,7 @@ static int32_t tmr_split_edge(tmr_work *w, int32_t c) {
         tmr_put_on_line(w, v, p, k);
         return v;
     }
-    const int32_t from = tmr_kind_of(m, a) == TRIMESH_FREE ? a : b;
-    const tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, from));
+    const tmr_place at = tmr_project_between(w, a, b, middle);
     if (!tmr_split_is_fair(w, c, at.p, tmr_normal_at(w->s, w->l, &at))) return -1;
     const int32_t v = tmr_split(m, c);
     if (v >= 0) tmr_put(w, v, &at);

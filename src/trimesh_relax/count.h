@@ -62,7 +62,7 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
             if (sign > 0 && size < 0.6 && pass < 30) continue;
             TRIMESH_ASSERT(count < most);
             const int64_t full = tmr_count_cost(m, c, sign);
-            const int64_t cost = full < TMR_MOST_COST ? full : TMR_MOST_COST;
+            const int64_t cost = full < TMR_MOST_COST ? full : (int64_t)TMR_MOST_COST;
             pairs[count].key = (uint32_t)(1000 * (100 + cost) -
                                           sign * (int)(300 * fmin(size, 3)) +
                                           (m->edge[c] ? 2000 : 0));

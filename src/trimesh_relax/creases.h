@@ -2,6 +2,7 @@
 #define TRIMESH_RELAX_CREASES_H
 
 #include "seams.h"
+#include "bands.h"
 
 /* ---- creases and borders as lines --------------------------------------------------------- */
 
@@ -35,20 +36,24 @@ static double tmr_turn_at(const tmr_surface *s, int32_t c) {
     return o < 0 ? 0 : 1 - txm_d3_dot(s->normal[c / 3], s->normal[o / 3]);
 }
 
+#define TMR_GENTLE_CREASE 0.6 /* ours: see docs/choices.md#creases */
+
 /* Which edges of the surface are creases? Those at which it turns by the angle or more, and clearly
    more than at the other edges of the two triangles, which tells a sharp edge from a coarse mesh:
    there it turns at most half as much. Where three or four edges of two triangles are sharp, as on
-   small steps and pins, the angle alone decides if it is wide. Writes 1 per corner into
-   s->edge_kind. Returns how many edges are creases. */
-static size_t tmr_find_creases(tmr_surface *s, double angle) {
+   small steps and pins, the angle alone decides if it is wide. Between flats as wide as about half
+   an edge of the result, as beside a chamfer, TMR_GENTLE_CREASE of the angle is enough. Writes 1 per
+   corner into s->edge_kind. Returns how many edges are creases. */
+static size_t tmr_find_creases(tmr_surface *s, double angle, double spacing) {
     const double least = angle >= 180 ? 3 : 1 - cos(angle * (TXM_PI / 180));
+    const double gentle = angle >= 180 ? 3 : 1 - cos(TMR_GENTLE_CREASE * angle * (TXM_PI / 180));
     const double sure = fmax(least, 1 - cos(75 * (TXM_PI / 180)));
     size_t count = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t o = s->opposite[c];
         s->edge_kind[c] = o < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE;
         const double turn = tmr_turn_at(s, c);
-        if (o < 0 || turn < least) continue;
+        if (o < 0 || turn < gentle) continue;
         /* how much the other edges turn, except those that are as sharp themselves */
         const double around[4] = {tmr_turn_at(s, tmr_next(c)), tmr_turn_at(s, tmr_prev(c)),
                                   tmr_turn_at(s, tmr_next(o)), tmr_turn_at(s, tmr_prev(o))};
@@ -59,6 +64,7 @@ static size_t tmr_find_creases(tmr_surface *s, double angle) {
             sum += around[k] > 0.5 * turn ? 0 : around[k];
         }
         if (turn < sure && (sharp > 2 || sum > 0.25 * turn)) continue;
+        if (turn < least && !tmr_is_between_flats(s, c, spacing)) continue;
         s->edge_kind[c] = TMR_CREASE_EDGE;
         count++;
     }
@@ -309,7 +315,7 @@ static void tmr_drop_spokes(tmr_surface *s, const tmr_ends *ends) {
 static txm_status tmr_find_lines(tmr_surface *s, const trimesh_desc *desc, double angle,
                                  double spacing, txm_arena *scratch, tmr_ends *ends) {
     txm_status status;
-    if (tmr_find_creases(s, angle)) {
+    if (tmr_find_creases(s, angle, spacing)) {
         if ((status = tmr_list_ends(s, scratch, ends)) != TXM_OK) return status;
         status = tmr_drop_short_lines(s, ends, fmax(5 * spacing, 0.06), TMR_BORDER_EDGE, scratch);
         if (status != TXM_OK) return status;

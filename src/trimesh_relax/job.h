@@ -3,6 +3,7 @@
 
 #include "mend_all.h"
 #include "density.h"
+#include "ridges.h"
 #include "repel.h"
 #include "retile.h"
 
@@ -31,6 +32,7 @@ struct trimesh_job {
     int shown;             /* the last one done                                                */
     int round, rounds;     /* of repulsion: done; at most                                      */
     double mean, largest;  /* movement in the last one                                         */
+    int plain;             /* strips are left as they are: ridges.h                              */
     int retries;           /* with adapted density so far                                       */
     float *plain_scale;    /* scale before the retries                                          */
     int cut; /* how often the number is quartered, then triangles cut in four          */
@@ -97,6 +99,9 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     tmr_normalize_scale(&job->s);
     if (job->desc.adapt > 0)
         status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
+                                 &job->scratch);
+    if (status == TXM_OK && !job->plain)
+        status = tmr_make_ridges(&job->s, angle, tmr_job_spacing(job), &job->env, &job->input,
                                  &job->scratch);
     if (status == TXM_OK)
         status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job), &job->input,
@@ -226,6 +231,20 @@ static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     return TXM_OK;
 }
 
+/* Prepare another attempt from the beginning, without lines instead of strips. */
+static txm_status tmr_job_without_ridges(trimesh_job *job) {
+    txm_arena_free(&job->first);
+    txm_arena_free(&job->second);
+    txm_arena_free(&job->input);
+    memset(&job->s, 0, sizeof job->s);
+    memset(&job->l, 0, sizeof job->l);
+    memset(&job->w, 0, sizeof job->w);
+    job->plain = 1;
+    job->cut = job->retries = 0;
+    job->stage = TMR_STAGE_MEND;
+    return TXM_OK;
+}
+
 /* Finish, and check that no triangle is inverted or crosses another one: a result that is not sound
    is never returned. */
 static txm_status tmr_job_finish(trimesh_job *job) {
@@ -247,6 +266,7 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         status = tmr_surface_crosses(job, 1, &crosses);
         if (status != TXM_OK || crosses) return status;
     }
+    if (job->s.section) return tmr_job_without_ridges(job);
     return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
                             "the surface has parts too thin or too fine for # vertices without "
                             "crossings; give about #",

@@ -33,13 +33,14 @@ static void tmr_fill_normals(tmr_surface *s, const int32_t *thin, int32_t count)
 
 /* Normals of faces; *count faces of no area are listed in thin. */
 static void tmr_face_normals(const tmr_mend *m, tmr_surface *s, int32_t *thin, int32_t *count) {
-    s->area = 0;
+    s->area = s->volume = 0;
     *count = 0;
     for (int32_t f = 0; f < s->face_count; f++) {
         txm_dvec3 p[3];
         for (int k = 0; k < 3; k++) p[k] = s->point[s->vertex[3 * f + k]];
         const txm_dvec3 n = txm_d3_area2(p[0], p[1], p[2]);
         s->area += 0.5 * txm_d3_len(n);
+        s->volume += txm_d3_dot(p[0], n) / 6;
         s->normal[f] = txm_d3_unit(n);
         if (tmr_is_thin(m, p)) {
             s->normal[f] = txm_d3(0, 0, 0);

@@ -5,6 +5,7 @@
 #include "count.h"
 #include "subdivide.h"
 #include "validity.h"
+#include "ridges.h"
 
 /* ---- retiling ----------------------------------------------------------------------------- */
 
@@ -119,6 +120,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
     for (int round = 0; round < TMR_FOLD_ROUNDS; round++)
         if (tmr_open_folds(w, TMR_FOLD_STEP) == 0) break;
+    tmr_return_volume(w);
     return TXM_OK;
 }
 
@@ -192,6 +194,8 @@ static txm_status tmr_write(const tmr_work *w, trimesh_mesh **out) {
         mesh->triangle_count++;
     }
     mesh->edge_length = w->length * s->diagonal;
+    if (s->loop_count == 0 && s->volume > 0)
+        mesh->volume_change = tmr_mesh_volume(m, m->p) / s->volume - 1;
     mesh->memory = arena;
     txm_arena_free(&scratch);
     *out = mesh;

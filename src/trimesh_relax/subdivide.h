@@ -86,8 +86,7 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
             p = tmr_line_middle(w, id, x, y, &k);
             tmr_put_on_line(w, v, p, k);
         } else {
-            const int32_t from = tmr_kind_of(m, x) == TRIMESH_FREE ? x : y;
-            const tmr_place at = tmr_project(w->s, p, tmr_face_of(w, from));
+            const tmr_place at = tmr_project_between(w, x, y, p);
             tmr_put(w, v, &at);
         }
     }
@@ -174,7 +173,14 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
 /* Chords lie inside a round surface, so a mesh with its vertices on the surface has too little
    volume. Each free vertex moves along its normal by the mean height of the surface over the
    triangles around it. The mean height over one triangle is 3/4 of that at its centre plus 1/4 of
-   the mean of those at its corners, which is exact for a paraboloid. */
+   the mean of those at its corners, which is exact for a paraboloid. It moves off the
+   surface by no more than TMR_FIT_OUT, except where the surface is round all around: beside a fillet
+   it would stick out. On a flat it stays. */
+#define TMR_FIT_OUT 0.02f   /* ours: in edge lengths                                           */
+#define TMR_FIT_MOST 0.15f  /* ours: where it is round                                         */
+#define TMR_FIT_EVEN 1e-4f  /* ours: triangles of lower height lie in a flat                   */
+#define TMR_FIT_ROUND 0.3f  /* ours: it is, if the second lowest height is this part of the mean */
+
 static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
     const int32_t *v = m->vertex + 3 * face;
@@ -199,6 +205,71 @@ static int tmr_may_fit(const tmr_work *w, int32_t v) {
            (kind == TRIMESH_CREASE && tmr_is_smooth_segment(w->l, w->m.source[v]));
 }
 
+/* How far may vertex v move out of the surface (sign 1) or into it (-1)? Not at all if triangles
+   around it lie in a flat. On a smooth surface the heights over the triangles around are nearly
+   equal; the second lowest one tells such places from those beside a fillet, where some are high. */
+static float tmr_fit_limit(const tmr_work *w, int32_t v, float sign) {
+    const tmr_mesh *m = &w->m;
+    const float unit = txm_float(w->length * w->size[v]);
+    float low[2] = {0, 0}, sum = 0; /* the lowest heights, in rising order */
+    int count = 0, flat = 0;
+    int32_t c = m->corner[v];
+    const int32_t first = c;
+    do {
+        if (!tmr_is_ghost_face(m, c / 3)) {
+            float h = sign * w->height[c / 3];
+            flat += h < TMR_FIT_EVEN * unit && h > -TMR_FIT_EVEN * unit;
+            sum += h;
+            for (int k = 0; k < 2; k++) {
+                const float old = low[k];
+                if (k < count && old <= h) continue;
+                low[k] = h;
+                h = old;
+                if (k >= count) break;
+            }
+            count++;
+        }
+        c = tmr_swing(m, c);
+    } while (c != first);
+    if (flat >= 2 || count == 0) return 0;
+    const float second = low[count > 1 ? 1 : 0];
+    return (second * (float)count < TMR_FIT_ROUND * sum ? TMR_FIT_OUT : TMR_FIT_MOST) * unit;
+}
+
+static void tmr_limit_chunk(void *context, int index) {
+    tmr_work *w = (tmr_work *)context;
+    const tmr_mesh *m = &w->m;
+    const int32_t from = index * TMR_CHUNK;
+    const int32_t to = from + TMR_CHUNK < m->vertex_count ? from + TMR_CHUNK : m->vertex_count;
+    for (int32_t v = from; v < to; v++) {
+        w->limit[v][0] = w->limit[v][1] = 0;
+        if (m->corner[v] < 0 || tmr_is_ghost(m, v) || !tmr_may_fit(w, v)) continue;
+        w->limit[v][0] = -tmr_fit_limit(w, v, -1);
+        w->limit[v][1] = tmr_fit_limit(w, v, 1);
+    }
+}
+
+/* Move vertex v by the mean height around it, within its limits. */
+static void tmr_fit_vertex(tmr_work *w, int32_t v) {
+    const tmr_mesh *m = &w->m;
+    double sum = 0;
+    int count = 0;
+    int32_t c = m->corner[v];
+    const int32_t first = c;
+    do {
+        if (!tmr_is_ghost_face(m, c / 3)) {
+            sum += w->height[c / 3];
+            count++;
+        }
+        c = tmr_swing(m, c);
+    } while (c != first);
+    if (count == 0) return;
+    const tmr_place at = tmr_on_face(w->s, tmr_face_of(w, v), m->p[v]);
+    const double now = txm_d3_dot(txm_d3_sub(m->p[v], at.p), m->n[v]), to = now + sum / count;
+    const double least = w->limit[v][0], most = w->limit[v][1];
+    w->moved[v] = txm_d3_mad(m->p[v], m->n[v], (to < least ? least : to > most ? most : to) - now);
+}
+
 static void tmr_fit_chunk(void *context, int index) {
     tmr_work *w = (tmr_work *)context;
     const tmr_mesh *m = &w->m;
@@ -207,20 +278,7 @@ static void tmr_fit_chunk(void *context, int index) {
     for (int32_t v = from; v < to; v++) {
         tmr_keep_place(w, v);
         if (m->corner[v] < 0 || tmr_is_ghost(m, v) || !tmr_may_fit(w, v)) continue;
-        double sum = 0;
-        int count = 0;
-        int32_t c = m->corner[v];
-        const int32_t first = c;
-        do {
-            if (!tmr_is_ghost_face(m, c / 3)) {
-                sum += w->height[c / 3];
-                count++;
-            }
-            c = tmr_swing(m, c);
-        } while (c != first);
-        const double most = 0.15 * w->length * w->size[v];
-        sum = count ? sum / count : 0;
-        w->moved[v] = txm_d3_mad(m->p[v], m->n[v], sum > most ? most : sum < -most ? -most : sum);
+        tmr_fit_vertex(w, v);
     }
 }
 
@@ -235,10 +293,13 @@ static void tmr_height_chunk(void *context, int index) {
 
 static txm_status tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
     w->height = (float *)txm_arena_alloc(scratch, (size_t)w->m.face_count, sizeof(float));
-    if (!w->height) return TXM_OUT_OF_MEMORY;
+    w->limit = (float(*)[2])txm_arena_alloc(scratch, (size_t)w->m.vertex_count, 2 * sizeof(float));
+    if (!w->height || !w->limit) return TXM_OUT_OF_MEMORY;
     for (int round = 0; round < rounds; round++) {
         txm_parallel_for(w->env, (w->m.face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_height_chunk, w);
-        txm_parallel_for(w->env, (w->m.vertex_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_fit_chunk, w);
+        const int chunks = (w->m.vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
+        if (round == 0) txm_parallel_for(w->env, chunks, tmr_limit_chunk, w);
+        txm_parallel_for(w->env, chunks, tmr_fit_chunk, w);
         tmr_settle(w);
     }
     return TXM_OK;

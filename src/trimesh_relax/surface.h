@@ -29,9 +29,12 @@ typedef struct tmr_surface {
                                - 4 for turn >= 4 (winding reversed)                             */
     float *scale;           /* 1 per vertex: wanted edge length, relative; NULL = uniform       */
     uint8_t *edge_kind;     /* 1 per corner: kind of the opposite edge; creases are found later */
+    float *section;         /* NULL, or 1 per corner: of the strip that its edge stands for, its
+                               cross-section, 0 = none: ridges.h                              */
     txm_dvec3 centre;       /* in the caller's units; caller's = point * diagonal + centre      */
     double diagonal;
     double area;            /* of all faces, in scaled units                                    */
+    double volume;          /* inside, before strips were made lines: ridges.h                  */
 } tmr_surface;
 /* How to walk around a vertex, from corner c of it (surfaces are oriented, vertices have one fan):
 

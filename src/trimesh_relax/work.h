@@ -23,6 +23,7 @@ typedef struct tmr_work {
     uint8_t *bad;      /* 1 per vertex: scratch: a mark                                         */
     uint8_t *flag;     /* 1 per triangle: scratch: a mark                                       */
     float *height;     /* 1 per triangle: scratch: height of the surface over it                */
+    float (*limit)[2]; /* 1 per vertex: scratch: how far into and out of the surface it may fit */
     uint8_t *mask;     /* of relaxation: NULL, or 1 per vertex: may it move?                    */
     uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
@@ -66,15 +67,46 @@ static txm_dvec3 tmr_middle(const tmr_mesh *m, const int32_t *v) {
     return txm_d3_scale(txm_d3_add(txm_d3_add(m->p[v[0]], m->p[v[1]]), m->p[v[2]]), 1.0 / 3);
 }
 
+/* The place of the surface nearest to p, walking from all its faces at vertex v: beside a crease the
+   distance may fall on one side only. */
+static tmr_place tmr_project_from(const tmr_work *w, int32_t v, txm_dvec3 p) {
+    const tmr_surface *s = w->s;
+    const int32_t k = w->m.source[v];
+    const int kind = tmr_kind_of(&w->m, v);
+    tmr_place at = tmr_project(s, p, tmr_face_of(w, v));
+    if (kind == TRIMESH_CORNER) {
+        const int32_t first = s->corner[k];
+        for (int32_t c = tmr_ccw(s->opposite, first); c >= 0 && c != first; c = tmr_ccw(s->opposite, c)) {
+            const tmr_place other = tmr_project(s, p, c / 3);
+            if (other.d2 < at.d2) at = other;
+        }
+    } else if (kind != TRIMESH_FREE) {
+        for (int32_t c = 3 * w->l->face[k], i = 0; i < 3; i++, c++) {
+            if (s->vertex[c] == w->l->a[k] || s->vertex[c] == w->l->b[k] || s->opposite[c] < 0) continue;
+            const tmr_place other = tmr_project(s, p, s->opposite[c] / 3);
+            if (other.d2 < at.d2) at = other;
+        }
+    }
+    return at;
+}
+
 /* the place of the surface nearest to it, walking from all three vertices */
 static tmr_place tmr_below_middle(const tmr_work *w, const int32_t *v) {
     const txm_dvec3 middle = tmr_middle(&w->m, v);
-    tmr_place at = tmr_project(w->s, middle, tmr_face_of(w, v[0]));
+    tmr_place at = tmr_project_from(w, v[0], middle);
     for (int k = 1; k < 3; k++) {
-        const tmr_place other = tmr_project(w->s, middle, tmr_face_of(w, v[k]));
+        const tmr_place other = tmr_project_from(w, v[k], middle);
         if (other.d2 < at.d2) at = other;
     }
     return at;
+}
+
+/* the place of the surface nearest to p, a point between the vertices a and b */
+static tmr_place tmr_project_between(const tmr_work *w, int32_t a, int32_t b, txm_dvec3 p) {
+    if (tmr_kind_of(&w->m, a) == TRIMESH_FREE) return tmr_project(w->s, p, w->m.source[a]);
+    if (tmr_kind_of(&w->m, b) == TRIMESH_FREE) return tmr_project(w->s, p, w->m.source[b]);
+    const tmr_place one = tmr_project_from(w, a, p), two = tmr_project_from(w, b, p);
+    return two.d2 < one.d2 ? two : one;
 }
 
 /* The normal that a triangle should have: the mean normal of its free vertices, since normals on

@@ -135,6 +135,12 @@ check "an .stl holds no texture coordinates" warns "will hold no texture coordin
     -o t.stl --vertices 100
 check "nor colors" warns "will hold no colors" retile colored.ply -o t.stl --vertices 100
 refuses 2 "holds no texture; name one" torus.obj -o t.stl --vertices 100 --texture torus.obj
+check "a wire of twelve sides, thinner than an edge" sh -c "awk 'BEGIN { n = 12; for (i = 0; i < 2 * n; i++)
+    print \"v\", cos(i * 8 * atan2(1, 1) / n), sin(i * 8 * atan2(1, 1) / n), 2000 * (i >= n)
+    for (i = 1; i <= n; i++) { j = i % n + 1; print \"f\", i, j, j + n, i + n; a = a \" \" n + 1 - i; b = b \" \" n + i }
+    print \"f\" a; print \"f\" b }' >wire.obj"
+check "loses volume, with a warning" warns "the volume has changed by -" retile wire.obj -o wire-out.obj \
+    --vertices 2000
 check "faces of two corners are left out" sh -c "cp bare.obj two.obj && echo 'f 1 2' >>two.obj"
 check "with a warning" warns "left out: faces with less than three corners (1)" retile two.obj -o two-out.obj \
     --vertices 300

@@ -134,6 +134,7 @@ int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, doubl
     cli_figure(run, "crease_edges", (double)r->crease_edges);
     cli_figure(run, "seam_edges", (double)r->seam_edges);
     cli_figure(run, "edge_length", m->edge_length * scale);
+    cli_figure(run, "volume_change", m->volume_change);
     cli_figure(run, "quality", *mean_quality);
     cli_figure(run, "quality_least", least_quality);
     cli_figure(run, "valence_6", *valence_6);

@@ -240,6 +240,15 @@ static int retile_surface(retile_job *j, uint32_t *seams) {
     return check_result(&j->run, result, j->run.inputs[0]);
 }
 
+enum { LARGE_CHANGE = 2 }; /* of the volume, in percent: worth a warning */
+
+static void warn_of_volume(retile_job *j) {
+    const double change = 100 * j->result->volume_change;
+    if (change < LARGE_CHANGE && change > -LARGE_CHANGE) return;
+    cli_warn(&j->run, "the volume has changed by %.1f %%: parts of '%s' are too thin for edges of "
+             "this length; more vertices keep more of it", change, j->run.inputs[0]);
+}
+
 static int retile(retile_job *j) {
     float *scale = NULL;
     uint32_t *seams = NULL;
@@ -257,6 +266,7 @@ static int retile(retile_job *j) {
     free(scale);
     free(seams);
     if (status) return status;
+    warn_of_volume(j);
     j->output.vertex_count = j->result->vertex_count;
     j->output.triangle_count = j->result->triangle_count;
     j->output.positions = j->result->positions;
