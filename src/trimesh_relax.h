@@ -73,6 +73,8 @@
      needs more vertices. A surface that crosses itself is accepted; its result may cross itself, too.
      Creases sharper than 120 degrees stay creases, so two triangles nearly face each other there.
      The number of vertices is exact; edge lengths follow from it.
+     Positions are floats, which hold some seven digits: from a mesh that lies farther from the origin
+     than 16 times its size, as those in map coordinates do, take an origin away in double first.
 
    REFERENCES
      [1] M. Glinzner. Texturing of 3D objects using simple physics and equilateral triangle patches.

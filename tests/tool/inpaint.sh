@@ -93,6 +93,15 @@ check "--prior FILE.obj" run 0 inpaint $ball -o l.png --prior lines.obj
 check "only the holes change" look kept ball.png ball-mask.png l.png
 echo '{"strokes": [{"points": [[0,1,0], [0.7,0.7,0]]}]}' >lines.json
 check "--prior FILE.json" run 0 inpaint $ball -o l.png --prior lines.json
+# a mesh in map coordinates, and lines in the same
+awk '/^v / { printf "v %.6f %.6f %s\n", $2 + 455000, $3 + 5400000, $4; next } { print }' ball.obj >far.obj
+awk '/^v / { printf "v %.6f %.6f %s\n", $2 + 455000, $3 + 5400000, $4; next } { print }' lines.obj >far-lines.obj
+echo '{"strokes": [{"points": [[455000,5400001,0], [455000.7,5400000.7,0]]}]}' >far-lines.json
+far="--mesh far.obj --texture ball.png --mask ball-mask.png"
+check "--mesh far away" run 0 inpaint $far -o f.png
+check "its lines of an .obj" run 0 inpaint $far -o f.png --prior far-lines.obj
+check "only the holes change" look kept ball.png ball-mask.png f.png
+check "its lines of a .json" run 0 inpaint $far -o f.png --prior far-lines.json
 check "--prior crest" run 0 inpaint $ball -o l.png --prior crest
 check "--prior none" run 0 inpaint $ball -o l.png --prior none
 for bad in '' 'v 0 0 0' 'l 1 2' 'v 0 0 0\nv 1 1 1\nl 1' 'v 0 0 0\nv 1 1 1\nl 1 0' 'v 0 0 0\nv 1 1 x\nl 1 2' 'v 0 0 0\nl 1 1x'; do

@@ -338,6 +338,18 @@ static void glb_nodes_place_their_meshes(void **state) {
     mesh_free(&m);
 }
 
+/* A skin's node is nowhere: joints hold the mesh. */
+static void glb_skins_are_left_out(void **state) {
+    (void)state;
+    mesh_data m;
+    read_glb("{" VIEWS ",\"nodes\":[{\"mesh\":0,\"skin\":0,\"translation\":[7,0,0]}],\"meshes\":[{"
+             "\"primitives\":[" ATTRIBUTES ",\"indices\":5,\"targets\":[{}]}]}]}", &m);
+    assert_int_equal(m.triangle_count, 1);
+    assert_float_equal(m.positions[3], 1, 0);
+    assert_string_equal(m.note, "left out: skins (1), morph targets (1)");
+    mesh_free(&m);
+}
+
 /* What is written is read again, with all that it has, at its place. */
 static void glb_comes_back(void **state) {
     (void)state;
@@ -419,6 +431,8 @@ static void glb_says_what_is_wrong(void **state) {
     assert_glb_fails("[]", "its JSON is damaged");
     assert_glb_fails("{", "its JSON is damaged");
     assert_glb_fails("{}", "no triangles in it");
+    assert_glb_fails("{\"buffers\":[{\"uri\":\"x.bin\"}]}",
+                     "its triangles are in another file; save all in one");
     assert_glb_fails("{\"extensionsRequired\":[\"KHR_draco_mesh_compression\"]}",
                      "it needs the extension KHR_draco_mesh_compression; save it without");
     assert_glb_fails("{\"nodes\":[{\"children\":[1]},{\"children\":[1]}]}", "node 1 has two parents");
@@ -495,6 +509,7 @@ int main(void) {
         cmocka_unit_test(off_of_all_kinds),
         cmocka_unit_test(glb_strips_fans_and_lists),
         cmocka_unit_test(glb_nodes_place_their_meshes),
+        cmocka_unit_test(glb_skins_are_left_out),
         cmocka_unit_test(glb_comes_back),
         cmocka_unit_test(glb_says_what_is_wrong),
         cmocka_unit_test(glb_copies_are_limited),

@@ -235,8 +235,8 @@ static void write_note(builder *b) {
     static const char *const names[LEFT_KINDS] = {
         "faces with less than three corners", "unused vertices that are not finite",
         "texture coordinates that are not finite", "normals that are not finite",
-        "attributes of STL facets", "points and lines", "instanced meshes",
-        "colors that are not finite", "further material libraries",
+        "attributes of STL facets", "points and lines", "instanced meshes", "skins",
+        "morph targets", "colors that are not finite", "further material libraries",
         "pictures and colors of materials"};
     char *to = b->mesh->note;
     const size_t room = sizeof b->mesh->note;

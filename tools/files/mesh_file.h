@@ -59,7 +59,7 @@ static inline shade shade_none(void) {
 /* What is left out and counted, as it does no harm. */
 enum {
     LEFT_FACES, LEFT_VERTICES, LEFT_UVS, LEFT_NORMALS, LEFT_FACET_BYTES, LEFT_PRIMITIVES,
-    LEFT_INSTANCES, LEFT_COLORS, LEFT_LIBRARIES, LEFT_LOOKS, LEFT_KINDS
+    LEFT_INSTANCES, LEFT_SKINS, LEFT_TARGETS, LEFT_COLORS, LEFT_LIBRARIES, LEFT_LOOKS, LEFT_KINDS
 };
 
 /* A position that is not finite. */

@@ -132,6 +132,13 @@ static int read_chunks(gltf *g, const unsigned char *bytes, size_t size) {
     return cJSON_IsObject(g->json) ? 1 : builder_fail(g->b, 0, "its JSON is damaged");
 }
 
+/* Is what the buffer holds in the file? */
+static int check_buffer(const gltf *g) {
+    const cJSON *first = cJSON_GetArrayItem(member(g->json, "buffers"), 0);
+    if (!member(first, "uri")) return 1;
+    return builder_fail(g->b, 0, "its triangles are in another file; save all in one");
+}
+
 /* Extensions without which the triangles are right. */
 static int check_extensions(const gltf *g) {
     static const char *const known[] = {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing",
@@ -489,10 +496,11 @@ static int read_primitive(gltf *g, const cJSON *json, const double *map, vertice
     }
     if (member(json, "indices") && !get_index(json, "indices", accessors, &index))
         return builder_fail(g->b, 0, "a primitive whose indices are out of range");
-    if (from.position == SIZE_MAX) {
+    if (from.position == SIZE_MAX) { /* glTF leaves to extensions what that means */
         g->b->left_out[LEFT_PRIMITIVES]++;
         return 1;
     }
+    g->b->left_out[LEFT_TARGETS] += member(json, "targets") != NULL;
     if (index != SIZE_MAX) {
         if (!read_accessor(g, index, &indices)) return 0;
         if (indices.width != 1 ||
@@ -608,8 +616,10 @@ static int read_node(gltf *g, const pending *p) {
     if (!get_index(json, "mesh", g->meshes.count, &mesh))
         return builder_fail(g->b, 0, "node %lu has a mesh that is out of range",
                             (unsigned long)p->node);
+    if (!member(json, "skin")) return read_mesh(g, mesh, p->map);
     /* a skin puts the mesh where its joints are; at rest that is where it was made */
-    return read_mesh(g, mesh, member(json, "skin") ? identity : p->map);
+    g->b->left_out[LEFT_SKINS]++;
+    return read_mesh(g, mesh, identity);
 }
 
 static int read_scene(gltf *g) {
@@ -636,7 +646,7 @@ int mesh_read_glb(builder *b, const unsigned char *bytes, size_t size) {
     g.room = least_of(size, SIZE_MAX / MOST_COPIES) * MOST_COPIES;
     if (g.room > 0x7fffffff) g.room = 0x7fffffff; /* vertices are numbered in 32 bits */
     b->v_runs_down = 1;
-    const int ok = read_chunks(&g, bytes, size) && check_extensions(&g) &&
+    const int ok = read_chunks(&g, bytes, size) && check_buffer(&g) && check_extensions(&g) &&
                    get_items(&g, "accessors", &g.accessors) &&
                    get_items(&g, "bufferViews", &g.views) && get_items(&g, "meshes", &g.meshes) &&
                    get_items(&g, "nodes", &g.nodes) &&
