@@ -317,7 +317,7 @@ static int run_job(retile_job *j, int argc, char **argv) {
         {CLI_INPUT, "--texture", "PICTURE", "texture: the one that MESH's coordinates are for",
          &j->texture, 0, 0},
         {CLI_FLAG, "--keep-seams", NULL,
-         "edges follow the seams of texture coordinates and materials, as they do with --texture",
+         "edges follow seams between charts and materials, as with --texture",
          &j->keep_seams, 0, 0},
         {CLI_FLAG, "--no-keep-seams", NULL, "they do not", &j->no_seams, 0, 0},
         {CLI_INPUT, "--instances", "PATCH.ply", "points or a small mesh for every triangle",
