@@ -142,14 +142,20 @@ typedef struct trimesh_report {
     size_t degenerate;          /* triangles without area, removed or flipped                */
     size_t duplicate;           /* triangles with the vertices of another                    */
     size_t fins;                /* triangles that stuck out of an edge of two others         */
+    size_t overfull;            /* edges of more than two triangles, which were joined in pairs */
+    size_t opened;              /* triangles left over at such edges, where they have a border */
     size_t turned;              /* triangles reversed to agree with their neighbours         */
+    size_t cut;                 /* edges cut because the surface was one-sided (Moebius)     */
+    size_t closed;              /* of the welded: vertices on borders that were only close   */
+    size_t stitched;            /* vertices put into sides of triangles on which they lay    */
     size_t split;               /* vertices added where fans met in one vertex               */
+    size_t dropped;             /* pieces dropped: below drop_below, or crumbs               */
+    double dropped_area;        /* and their part of the area, 0..1                          */
     size_t components;          /* connected pieces                                          */
     size_t loops;               /* border loops                                              */
     long euler;                 /* vertices - edges + triangles after the repair             */
     size_t crease_edges;        /* edges kept as creases                                     */
     size_t seam_edges;          /* edges kept as seams, some of which may be creases, too    */
-    uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that is not repairable  */
 } trimesh_report;
 
 /* ---- retiling ---------------------------------------------------------------------------- */
@@ -177,7 +183,15 @@ typedef struct trimesh_desc {
                               0.25..4; 0 = 1. Increased where lines would take more than half of
                               the vertices                                                      */
     float weld;            /* weld vertices closer than this, relative to the diagonal of the
-                              bounding box, 0..0.01; 0 = only those in the same place           */
+                              bounding box, at most 0.01. 0 = those in the same place, and on
+                              borders those closer than 1e-5 and a tenth of the edges there.
+                              Vertices as close to a border edge are put into it, which closes
+                              T-junctions. -1 = none of this, also in the same place            */
+    float drop_below;      /* drop connected pieces of less than this part of the area, 0..1, except
+                              the largest. Without it, too, crumbs are dropped: pieces that are
+                              worth less than four vertices, if they took more than 5 percent of
+                              the vertices beyond their share and are less than 10 percent of
+                              the area                                                          */
     int iterations;        /* TRIMESH_REPEL: maximum rounds of repulsion, 1..1000; 0 = 40       */
     uint64_t seed;         /* another seed gives another result                                 */
     const uint32_t *seams; /* 3 per triangle, one for each corner, any numbers, such as the indices
@@ -196,9 +210,8 @@ typedef struct trimesh_desc {
    desc    see there
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free
    return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, an index that is not below
-           vertex_count, a position that is not finite; TXM_BAD_DATA for a surface that cannot be
-           repaired (message and report name the first bad edge); TXM_TOO_SMALL if the surface cannot
-           be covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
+           vertex_count, a position that is not finite; TXM_TOO_SMALL if the surface cannot be
+           covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
            TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                      */
 TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh);
 
@@ -388,9 +401,10 @@ static int32_t tmr_cw(const int32_t *opposite, int32_t c) {
 
    vertices   scale to the unit box, weld, ignore unused ones
    faces      remove those with a vertex twice, and duplicates
+   gaps       weld the borders that nearly meet, put vertices into the sides on which they lie
    edges      find opposites; where an edge has more than two faces remove fins and interior walls,
-              separate sheets that touch, or refuse
-   winding    orient faces consistently, or refuse
+              and pair the others
+   winding    orient faces consistently, and cut where the surface is one-sided
    area       flip caps and collapse needles; start again if faces were added or removed
    fans       one vertex for each, numbered
    measures   normals, components, border loops                                                 */
@@ -428,6 +442,7 @@ typedef struct tmr_mend {
     int single;        /* non-zero: some face has no such duplicate                       */
     int32_t *list;     /* 1 per face, of the step at hand                                 */
     uint32_t *sides;   /* 1 per corner: the sides in the order of their edges; as much scratch */
+    txm_arena *arena, *scratch; /* what the surface keeps; what is freed after mending   */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
     txm_dvec3 centre;
@@ -438,24 +453,6 @@ typedef struct tmr_mend {
 static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
     if (!txm_progress(m->env, fraction, "mend")) return TXM_OK;
     return txm_fail(m->env, TXM_CANCELLED, "cancelled while mending the surface");
-}
-
-static txm_status tmr_mend_fail_edge(tmr_mend *m, int32_t corner, int count) {
-    const int32_t a = m->vertex[tmr_next(corner)], b = m->vertex[tmr_prev(corner)];
-    char line[160];
-    m->report.bad_edge[0] = (uint32_t)(a < b ? a : b);
-    m->report.bad_edge[1] = (uint32_t)(a < b ? b : a);
-    if (count > 2)
-        snprintf(line, sizeof line,
-                 "edge between vertex %ld and %ld (of the input, from 0) has %d triangles; "
-                 "make the surface a manifold: at most two at an edge",
-                 (long)m->report.bad_edge[0], (long)m->report.bad_edge[1], count);
-    else
-        snprintf(line, sizeof line,
-                 "edge between vertex %ld and %ld (of the input, from 0) closes a one-sided "
-                 "band; cut the surface so that it has two sides",
-                 (long)m->report.bad_edge[0], (long)m->report.bad_edge[1]);
-    return txm_fail(m->env, TXM_BAD_DATA, line);
 }
 
 static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
@@ -483,31 +480,39 @@ static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (status != TXM_OK) return status;
     if (desc->surface.vertex_count == 0 || desc->surface.face_count == 0)
         return txm_fail(env, TXM_TOO_SMALL, "surface: no vertices or no triangles");
-    if (!(desc->weld >= 0 && desc->weld <= 0.01f))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01");
+    if (!(desc->weld >= -1 && desc->weld <= 0.01f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01, or -1 for none");
     return desc->scale ? tmr_check_scale(desc, env) : TXM_OK;
 }
 
-/* Allocate all that the mending needs: what the surface keeps from arena, the rest from scratch. */
-static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scratch) {
-    const size_t v = (size_t)m->vertex_count, f = (size_t)m->face_count;
+/* Allocate what there is for each face and corner, with room for so many faces, and the table. What
+   the surface keeps lies in m->arena, the rest in m->scratch. */
+static txm_status tmr_mend_alloc_faces(tmr_mend *m, size_t faces) {
+    const size_t v = (size_t)m->vertex_count;
     m->table_size = 16;
-    while (m->table_size < 2 * (v > f ? v : f)) m->table_size *= 2;
-    m->vertex = (int32_t *)txm_arena_alloc(arena, 3 * f, sizeof(int32_t));
-    m->opposite = (int32_t *)txm_arena_alloc(arena, 3 * f, sizeof(int32_t));
-    m->origin = (uint32_t *)txm_arena_alloc(arena, f, sizeof(uint32_t));
-    m->turn = (uint8_t *)txm_arena_zero(arena, f, 1);
-    m->rename = (int32_t *)txm_arena_alloc(scratch, 3 * v, sizeof(int32_t));
-    m->flag = (uint8_t *)txm_arena_zero(scratch, 2 * f, 1);
-    m->list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
-    m->sides = (uint32_t *)txm_arena_alloc(scratch, 6 * f, sizeof(uint32_t));
-    m->table = (int32_t *)txm_arena_alloc(scratch, m->table_size, sizeof(int32_t));
-    if (arena->failed || scratch->failed)
+    while (m->table_size < 2 * (v > faces ? v : faces)) m->table_size *= 2;
+    m->vertex = (int32_t *)txm_arena_alloc(m->arena, 3 * faces, sizeof(int32_t));
+    m->opposite = (int32_t *)txm_arena_alloc(m->arena, 3 * faces, sizeof(int32_t));
+    m->origin = (uint32_t *)txm_arena_alloc(m->arena, faces, sizeof(uint32_t));
+    m->turn = (uint8_t *)txm_arena_zero(m->arena, faces, 1);
+    m->flag = (uint8_t *)txm_arena_zero(m->scratch, 2 * faces, 1);
+    m->list = (int32_t *)txm_arena_alloc(m->scratch, faces, sizeof(int32_t));
+    m->sides = (uint32_t *)txm_arena_alloc(m->scratch, 6 * faces, sizeof(uint32_t));
+    m->table = (int32_t *)txm_arena_alloc(m->scratch, m->table_size, sizeof(int32_t));
+    if (m->arena->failed || m->scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
+    m->twin = m->flag + faces;
+    return TXM_OK;
+}
+
+/* Allocate all that the mending needs. */
+static txm_status tmr_mend_alloc(tmr_mend *m) {
+    const size_t v = (size_t)m->vertex_count;
+    m->rename = (int32_t *)txm_arena_alloc(m->scratch, 3 * v, sizeof(int32_t));
+    if (!m->rename) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     m->degree = m->rename + v;
     m->stamp = m->degree + v;
-    m->twin = m->flag + f;
-    return TXM_OK;
+    return tmr_mend_alloc_faces(m, (size_t)m->face_count);
 }
 
 /* ---- mending: vertices -------------------------------------------------------------------- */
@@ -558,13 +563,15 @@ static txm_dvec3 tmr_cell(txm_dvec3 p, double size) {
     return size > 0 ? txm_d3(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
 }
 
-/* The lowest vertex in a cell that is not farther than size from point i, or else best. */
+/* The lowest vertex in a cell that is not farther than size from point i, or else best. reach: NULL,
+   or 1 per vertex: not farther than this of both, either. */
 static int32_t tmr_weld_find(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
-                             int32_t best) {
+                             const double *reach, int32_t best) {
     size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
     for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
         const int32_t j = m->table[slot] - 1;
-        if ((best < 0 || j < best) && txm_d3_dist2(m->point[i], m->point[j]) <= size * size)
+        const double most = reach ? fmin(size, fmin(reach[i], reach[j])) : size;
+        if ((best < 0 || j < best) && txm_d3_dist2(m->point[i], m->point[j]) <= most * most)
             best = j;
     }
     return best;
@@ -572,20 +579,21 @@ static int32_t tmr_weld_find(const tmr_mend *m, txm_dvec3 cell, int32_t i, doubl
 
 /* Each vertex, in order, is welded to the first kept vertex that is near enough, or else is kept.
    So chains of near vertices do not collapse into one, and a cell of the grid holds few kept
-   vertices. With size 0 only vertices in equal places are welded. */
-static void tmr_weld(tmr_mend *m) {
-    double size = m->desc->weld;
+   vertices. With size 0 only vertices in equal places are welded. reach: as tmr_weld_find has it;
+   vertices for which it is negative are left out. */
+static void tmr_weld(tmr_mend *m, double size, const double *reach) {
     if (size < 1e-14) size = 0; /* so that a cell's number plus 1 is another number */
-    const int reach = size > 0 ? 1 : 0;
+    const int range = size > 0 ? 1 : 0;
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t i = 0; i < m->vertex_count; i++) {
-        if (m->rename[i] < 0) continue;
+        if (m->rename[i] != i || (reach && reach[i] < 0)) continue;
         const txm_dvec3 cell = tmr_cell(m->point[i], size);
         int32_t best = -1;
-        for (int x = -reach; x <= reach; x++) {
-            for (int y = -reach; y <= reach; y++) {
-                for (int z = -reach; z <= reach; z++)
-                    best = tmr_weld_find(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
+        for (int x = -range; x <= range; x++) {
+            for (int y = -range; y <= range; y++) {
+                for (int z = -range; z <= range; z++)
+                    best = tmr_weld_find(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, reach,
+                                         best);
             }
         }
         if (best >= 0) {
@@ -771,72 +779,16 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     return 1;
 }
 
-/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces around
-   it, with alternating winding. Faces with the inside between them belong together:
-
-            \  solid /           e is the edge from its lower vertex to the higher. The normal of a
-         -   \      /  +         face that winds along e (+) points to rising angles, so the solid
-              \    /             lies between it and the one before it, which must wind against
-               \  /              e (-).
-         +_____ e _____-
-               solid                                                                            */
-static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
-    enum { MOST = 16 };
-    const txm_mesh mesh = tmr_mend_mesh(m);
-    const int32_t count = end - begin, low = (int32_t)txm_mesh_low(&mesh, m->sides[begin]);
-    const int32_t high = (int32_t)txm_mesh_high(&mesh, m->sides[begin]);
-    const txm_dvec3 e = txm_d3_unit(txm_d3_sub(m->point[high], m->point[low]));
-    txm_dvec3 u = e, w = e;
-    double angle[MOST];
-    int32_t corner[MOST];
-    if (count > MOST || count % 2) return 0;
-    for (int32_t k = 0; k < count; k++) {
-        const int32_t c = tmr_opposite_corner(m, begin + k);
-        txm_dvec3 d = txm_d3_sub(m->point[m->vertex[c]], m->point[low]);
-        d = txm_d3_mad(d, e, -txm_d3_dot(d, e));
-        if (tmr_face_is_thin(m, c / 3)) return 0;
-        if (k == 0) {
-            u = txm_d3_unit(d);
-            w = txm_d3_cross(e, u);
-        }
-        const double a = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
-        int32_t at = k;
-        for (; at > 0 && angle[at - 1] > a; at--) {
-            angle[at] = angle[at - 1];
-            corner[at] = corner[at - 1];
-        }
-        angle[at] = a;
-        corner[at] = c;
-    }
-    for (int32_t k = 0; k < count; k++) { /* clearly apart, and alternating? */
-        const int32_t next = (k + 1) % count;
-        const double gap = angle[next] - angle[k] + (next ? 0 : 2 * TXM_PI);
-        const int along = m->vertex[tmr_next(corner[k])] == low;
-        if (gap < 1e-4 || along == (m->vertex[tmr_next(corner[next])] == low)) return 0;
-    }
-    for (int32_t k = 0; k < count; k++) {
-        const int along = m->vertex[tmr_next(corner[k])] == low;
-        m->opposite[corner[k]] = corner[(k + count + (along ? -1 : 1)) % count];
-    }
-    return 1;
-}
-
 static void tmr_clear_flags(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) m->flag[f] = 0;
 }
 
 /* Call `mend` for the edges with more than two faces. Returns how many of them it mended. */
-static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t),
-                                 int32_t *bad, int *bad_count) {
+static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t)) {
     int32_t mended = 0;
     for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
         end = tmr_run_end(m, i);
-        if (end - i < 3) continue;
-        if (mend(m, i, end)) mended++;
-        else if (*bad < 0) {
-            *bad = tmr_opposite_corner(m, i);
-            *bad_count = (int)(end - i);
-        }
+        if (end - i > 2) mended += mend(m, i, end);
     }
     return mended;
 }
@@ -852,41 +804,316 @@ static size_t tmr_cut_flagged(tmr_mend *m) {
     return count;
 }
 
-/* Find the opposites, mending edges until each has at most two faces. */
-static txm_status tmr_mend_edges(tmr_mend *m) {
-    int32_t bad = -1;
-    int bad_count = 0;
-    for (int round = 0; tmr_mend_opposites(m) > 0; round++) {
-        int32_t ignored = 0; /* not below 0: nothing is written */
-        tmr_clear_flags(m);
-        for (int32_t f = 0; f < m->face_count; f++) m->single |= !m->twin[f];
-        if (round < TMR_MEND_ROUNDS) {
-            if (tmr_mend_overfull(m, tmr_cut_fins, &ignored, &bad_count)) {
-                m->report.fins += tmr_cut_flagged(m);
-                continue;
-            }
-            if (tmr_mend_overfull(m, tmr_cut_twins, &ignored, &bad_count)) {
-                m->report.duplicate += tmr_cut_flagged(m);
-                continue;
+/* ---- mending: edges of more than two faces ------------------------------------------------ */
+
+/* At such an edge the faces are paired, and each pair is joined as if the others were not there, so
+   that sheets that touch along the edge become separate. Of an odd number one face is left over: the
+   edge is part of its border. Every edge can be mended that way; which faces go together matters
+   only for the shape. */
+
+/* A face at an edge, as a spoke of a wheel seen along the edge, which runs from its lower vertex to
+   the higher. */
+typedef struct tmr_spoke {
+    double angle;   /* around the edge, radians                                               */
+    int32_t corner; /* opposite to the edge                                                   */
+    int32_t patch;  /* faces that are connected over edges of two faces have the same number  */
+    int along;      /* the face winds along the edge, not against it                          */
+    int paired;
+} tmr_spoke;
+
+typedef struct tmr_wheel {
+    tmr_spoke *spoke; /* room for the faces of any edge */
+    int32_t *patch;   /* 1 per face                     */
+    size_t pairs, singles; /* edges whose faces were paired; faces left over */
+} tmr_wheel;
+
+enum { TMR_WHEEL = 64 }; /* ours: of more faces at an edge neighbours are paired, the best are not sought */
+#define TMR_APART 1e-4   /* ours: radians between two sheets that are clearly apart                   */
+#define TMR_ALIKE 0.1    /* ours: radians: pairs that bend alike; then the patches decide, so that the
+                            same sheets are paired all along a line of such edges                    */
+
+static int tmr_spoke_before(const tmr_spoke *a, const tmr_spoke *b, int by_patch) {
+    if (by_patch && a->patch != b->patch) return a->patch < b->patch;
+    if (!by_patch && (a->angle < b->angle || a->angle > b->angle)) return a->angle < b->angle;
+    return a->corner < b->corner;
+}
+
+/* Sort as a heap: no two spokes are equal. */
+static void tmr_sort_spokes(tmr_spoke *spoke, int32_t count, int by_patch) {
+    for (int32_t end = count, start = count / 2; end > 1;) {
+        if (start > 0) start--; /* build the heap first, then take the last one off */
+        else {
+            const tmr_spoke last = spoke[--end];
+            spoke[end] = spoke[0];
+            spoke[0] = last;
+        }
+        for (int32_t root = start, child; (child = 2 * root + 1) < end; root = child) {
+            if (child + 1 < end && tmr_spoke_before(spoke + child, spoke + child + 1, by_patch))
+                child++;
+            if (!tmr_spoke_before(spoke + root, spoke + child, by_patch)) break;
+            const tmr_spoke moved = spoke[root];
+            spoke[root] = spoke[child];
+            spoke[child] = moved;
+        }
+    }
+}
+
+/* The faces around the edge of the sides begin to end - 1, by rising angle. Returns 0 if one of them
+   has no area, so that its angle says nothing. */
+static int tmr_spokes_make(const tmr_mend *m, int32_t begin, int32_t end, tmr_wheel *wheel) {
+    const txm_mesh mesh = tmr_mend_mesh(m);
+    const int32_t low = (int32_t)txm_mesh_low(&mesh, m->sides[begin]);
+    const int32_t high = (int32_t)txm_mesh_high(&mesh, m->sides[begin]);
+    const txm_dvec3 e = txm_d3_unit(txm_d3_sub(m->point[high], m->point[low]));
+    txm_dvec3 u = txm_d3(0, 0, 0), w = u;
+    int is_clear = 1;
+    for (int32_t k = 0; k < end - begin; k++) {
+        tmr_spoke *s = wheel->spoke + k;
+        const int32_t c = tmr_opposite_corner(m, begin + k);
+        txm_dvec3 d = txm_d3_sub(m->point[m->vertex[c]], m->point[low]);
+        d = txm_d3_mad(d, e, -txm_d3_dot(d, e));
+        is_clear &= !tmr_face_is_thin(m, c / 3);
+        if (!(txm_d3_len2(u) > 0)) {
+            u = txm_d3_unit(d);
+            w = txm_d3_cross(e, u);
+        }
+        s->angle = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
+        s->corner = c;
+        s->patch = wheel->patch[c / 3];
+        s->along = m->vertex[tmr_next(c)] == low;
+        s->paired = 0;
+    }
+    tmr_sort_spokes(wheel->spoke, end - begin, 0);
+    return is_clear;
+}
+
+static void tmr_pair_spokes(tmr_mend *m, tmr_spoke *a, tmr_spoke *b) {
+    a->paired = b->paired = 1;
+    m->opposite[a->corner] = b->corner;
+    m->opposite[b->corner] = a->corner;
+}
+
+/* Two or more sheets that touch along an edge, seen along it, angles rising clockwise: the faces have
+   alternating winding. Those with the inside between them belong together:
+
+            \  solid /           e is the edge from its lower vertex to the higher. The normal of a
+         -   \      /  +         face that winds along e (+) points to rising angles, so the solid
+              \    /             lies between it and the one before it, which must wind against
+               \  /              e (-).
+         +_____ e _____-
+               solid                                                                            */
+static int tmr_pair_solids(tmr_mend *m, tmr_spoke *spoke, int32_t count) {
+    if (count % 2) return 0;
+    for (int32_t k = 0; k < count; k++) { /* clearly apart, and alternating? */
+        const int32_t next = (k + 1) % count;
+        const double gap = spoke[next].angle - spoke[k].angle + (next ? 0 : 2 * TXM_PI);
+        if (gap < TMR_APART || spoke[k].along == spoke[next].along) return 0;
+    }
+    for (int32_t k = 0; k < count; k++)
+        if (spoke[k].along) tmr_pair_spokes(m, spoke + k, spoke + (k + count - 1) % count);
+    return 1;
+}
+
+/* how much a sheet of these two faces would bend at the edge, 0..pi; more if one of them had to be
+   reversed for that */
+static double tmr_spoke_bend(const tmr_spoke *a, const tmr_spoke *b) {
+    const double apart = fabs(a->angle - b->angle);
+    return TXM_PI - fmin(apart, 2 * TXM_PI - apart) + (a->along == b->along ? 2 * TXM_PI : 0);
+}
+
+/* Pair the faces of which a sheet bends least, again and again. */
+static void tmr_pair_straightest(tmr_mend *m, tmr_spoke *spoke, int32_t count) {
+    tmr_sort_spokes(spoke, count, 1);
+    for (int32_t left = count; left > 1; left -= 2) {
+        int32_t a = -1, b = -1;
+        double least = 0;
+        for (int32_t i = 0; i < count; i++) {
+            for (int32_t j = i + 1; j < count && !spoke[i].paired; j++) {
+                const double bend = tmr_spoke_bend(spoke + i, spoke + j);
+                if (spoke[j].paired || (a >= 0 && bend > least - TMR_ALIKE)) continue;
+                least = bend;
+                a = i;
+                b = j;
             }
         }
-        tmr_mend_overfull(m, tmr_pair_sheets, &bad, &bad_count);
-        if (bad >= 0) return tmr_mend_fail_edge(m, bad, bad_count);
-        break;
+        tmr_pair_spokes(m, spoke + a, spoke + b);
+    }
+}
+
+/* Pair neighbours by angle: those of different winding as brackets are paired, then the others. */
+static void tmr_pair_neighbors(tmr_mend *m, tmr_spoke *spoke, int32_t count) {
+    for (int pass = 0; pass < 2; pass++) {
+        int32_t open = -1; /* the last one without a partner; m->list: the one before it */
+        for (int32_t k = 0; k < count; k++) {
+            if (spoke[k].paired) continue;
+            if (open >= 0 && (pass || spoke[open].along != spoke[k].along)) {
+                tmr_pair_spokes(m, spoke + open, spoke + k);
+                open = m->list[open];
+            } else {
+                m->list[k] = open;
+                open = k;
+            }
+        }
+    }
+}
+
+/* Pair the faces of the edge of the sides begin to end - 1. */
+static void tmr_pair_edge(tmr_mend *m, int32_t begin, int32_t end, tmr_wheel *wheel) {
+    const int32_t count = end - begin;
+    const int is_clear = tmr_spokes_make(m, begin, end, wheel);
+    if (!is_clear || !tmr_pair_solids(m, wheel->spoke, count)) {
+        if (count <= TMR_WHEEL) tmr_pair_straightest(m, wheel->spoke, count);
+        else tmr_pair_neighbors(m, wheel->spoke, count);
+    }
+    for (int32_t k = 0; k < count; k++) {
+        if (wheel->spoke[k].paired) continue;
+        m->opposite[wheel->spoke[k].corner] = -1;
+        wheel->singles++;
+    }
+    wheel->pairs++;
+}
+
+/* Number the patches of faces. */
+static void tmr_find_patches(tmr_mend *m, int32_t *patch) {
+    for (int32_t f = 0; f < m->face_count; f++) patch[f] = -1;
+    for (int32_t f = 0; f < m->face_count; f++) {
+        int32_t count = 0;
+        if (patch[f] >= 0) continue;
+        patch[f] = f;
+        m->list[count++] = f;
+        for (int32_t i = 0; i < count; i++) {
+            for (int32_t c = 3 * m->list[i]; c < 3 * m->list[i] + 3; c++) {
+                const int32_t o = m->opposite[c];
+                if (o < 0 || patch[o / 3] >= 0) continue;
+                patch[o / 3] = f;
+                m->list[count++] = o / 3;
+            }
+        }
+    }
+}
+
+/* Pair the faces of all edges that have more than two. */
+static txm_status tmr_mend_pairs(tmr_mend *m) {
+    int32_t longest = 0;
+    tmr_wheel wheel;
+    memset(&wheel, 0, sizeof wheel);
+    for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
+        end = tmr_run_end(m, i);
+        if (end - i > longest) longest = end - i;
+    }
+    wheel.spoke = (tmr_spoke *)txm_arena_alloc(m->scratch, (size_t)longest, sizeof(tmr_spoke));
+    wheel.patch = (int32_t *)txm_arena_alloc(m->scratch, (size_t)m->face_count, sizeof(int32_t));
+    if (m->scratch->failed)
+        return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
+    tmr_find_patches(m, wheel.patch);
+    for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
+        end = tmr_run_end(m, i);
+        if (end - i > 2) tmr_pair_edge(m, i, end, &wheel);
+    }
+    m->report.overfull = wheel.pairs;
+    m->report.opened = wheel.singles;
+    return TXM_OK;
+}
+
+/* Find the opposites, mending edges until each has at most two faces. */
+static txm_status tmr_mend_edges(tmr_mend *m) {
+    m->report.overfull = m->report.opened = 0;
+    for (int round = 0; tmr_mend_opposites(m) > 0; round++) {
+        tmr_clear_flags(m);
+        for (int32_t f = 0; f < m->face_count; f++) m->single |= !m->twin[f];
+        if (round == TMR_MEND_ROUNDS) return tmr_mend_pairs(m);
+        if (tmr_mend_overfull(m, tmr_cut_fins)) m->report.fins += tmr_cut_flagged(m);
+        else if (tmr_mend_overfull(m, tmr_cut_twins)) m->report.duplicate += tmr_cut_flagged(m);
+        else return tmr_mend_pairs(m);
     }
     return TXM_OK;
 }
 
 /* ---- mending: orientation ----------------------------------------------------------------- */
 
-/* Flag the component of face first: 1 = stays, 2 = to be reversed, so that all of it has the
-   winding of most of its area (if equal: of the first face). Returns 0 if it cannot be oriented;
-   then the edge opposite to corner *bad closes a one-sided band. */
-static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
-    double stays = 0, turns = 0; /* area */
-    int32_t count = 0;
+/* Does the face beyond the edge of corner c have the same winding? */
+static int tmr_winds_alike(const tmr_mend *m, int32_t c) {
+    return m->vertex[tmr_next(c)] == m->vertex[tmr_prev(m->opposite[c])];
+}
+
+/* List the component of face first in m->list, and flag its faces: 1 = stays, 2 = to be reversed.
+   Edges whose faces have different winding are crossed only where no other is left, so that a
+   surface that cannot be oriented is cut there. Returns how many faces. */
+static int32_t tmr_flag_windings(tmr_mend *m, int32_t first) {
+    uint32_t *later = m->sides + 3 * m->face_count; /* 1 per corner at most: each is looked at once */
+    int32_t count = 0, done = 0, waiting = 0, next = 0;
     m->flag[first] = 1;
     m->list[count++] = first;
+    for (;;) {
+        if (done < count) {
+            const int32_t f = m->list[done++];
+            for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
+                const int32_t o = m->opposite[c];
+                if (o < 0 || m->flag[o / 3]) continue;
+                if (!tmr_winds_alike(m, c)) {
+                    TRIMESH_ASSERT(waiting < 3 * m->face_count);
+                    later[waiting++] = (uint32_t)c;
+                    continue;
+                }
+                m->flag[o / 3] = m->flag[f];
+                m->list[count++] = o / 3;
+            }
+        } else if (next < waiting) {
+            const int32_t c = (int32_t)later[next++], g = m->opposite[c] / 3;
+            if (m->flag[g]) continue;
+            m->flag[g] = (uint8_t)(3 - m->flag[c / 3]);
+            m->list[count++] = g;
+        } else return count;
+    }
+}
+
+/* Would the faces at the edge of corner c still have different winding? */
+static int tmr_is_twisted(const tmr_mend *m, int32_t c) {
+    const int32_t o = m->opposite[c];
+    return o >= 0 && tmr_winds_alike(m, c) != (m->flag[c / 3] == m->flag[o / 3]);
+}
+
+/* The other way round, would face f have shorter twisted edges? */
+static int tmr_untwists(const tmr_mend *m, int32_t f) {
+    double gain = 0, all = 0;
+    for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
+        const double length = m->opposite[c] < 0 ? 0
+                                                 : txm_d3_dist(m->point[m->vertex[tmr_next(c)]],
+                                                               m->point[m->vertex[tmr_prev(c)]]);
+        gain += tmr_is_twisted(m, c) ? length : -length;
+        all += length;
+    }
+    return gain > 1e-6 * all;
+}
+
+/* Cut the twisted edges of the count faces of m->list: lines from border to border, or loops, as
+   around each vertex they are even in number. First let them become shorter. */
+static void tmr_cut_twisted(tmr_mend *m, int32_t count) {
+    int turned = 1;
+    for (int sweep = 0; turned && sweep < TMR_FLIP_SWEEPS; sweep++) {
+        turned = 0;
+        for (int32_t i = 0; i < count; i++) {
+            if (!tmr_untwists(m, m->list[i])) continue;
+            m->flag[m->list[i]] = (uint8_t)(3 - m->flag[m->list[i]]);
+            turned = 1;
+        }
+    }
+    for (int32_t i = 0; i < count; i++) {
+        for (int32_t c = 3 * m->list[i]; c < 3 * m->list[i] + 3; c++) {
+            if (!tmr_is_twisted(m, c)) continue;
+            m->opposite[m->opposite[c]] = -1;
+            m->opposite[c] = -1;
+            m->report.cut++;
+        }
+    }
+}
+
+/* Flag the component of face first: 1 = stays, 2 = to be reversed, so that all of it has the
+   winding of most of its area (if equal: of the first face). Cut it where it is one-sided. */
+static void tmr_orient_component(tmr_mend *m, int32_t first) {
+    double stays = 0, turns = 0; /* area */
+    int twisted = 0;
+    const int32_t count = tmr_flag_windings(m, first);
     for (int32_t i = 0; i < count; i++) {
         const int32_t f = m->list[i];
         txm_dvec3 p[3];
@@ -894,26 +1121,13 @@ static int tmr_orient_component(tmr_mend *m, int32_t first, int32_t *bad) {
         const double area = txm_d3_len(txm_d3_area2(p[0], p[1], p[2]));
         if (m->flag[f] == 1) stays += area;
         else turns += area;
-        for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
-            const int32_t o = m->opposite[c], g = o / 3;
-            if (o < 0) continue;
-            const int alike = m->vertex[tmr_next(c)] == m->vertex[tmr_prev(o)];
-            const uint8_t want = (uint8_t)(alike ? m->flag[f] : 3 - m->flag[f]);
-            if (m->flag[g] == 0) {
-                m->flag[g] = want;
-                TRIMESH_ASSERT(count < m->face_count);
-                m->list[count++] = g;
-            } else if (m->flag[g] != want) {
-                *bad = c;
-                return 0;
-            }
-        }
+        for (int32_t c = 3 * f; c < 3 * f + 3; c++) twisted |= tmr_is_twisted(m, c);
     }
+    if (twisted) tmr_cut_twisted(m, count);
     if (turns > stays * (1 + 1e-9)) { /* if equal up to rounding, the first face stays   */
         for (int32_t i = 0; i < count; i++)
             m->flag[m->list[i]] = (uint8_t)(3 - m->flag[m->list[i]]);
     }
-    return 1;
 }
 
 /* Reverse the faces with flag 2: swap their corners 1 and 2. */
@@ -933,15 +1147,12 @@ static void tmr_turn_flagged(tmr_mend *m) {
     }
 }
 
-static txm_status tmr_mend_orient(tmr_mend *m) {
-    int32_t bad = -1;
+static void tmr_mend_orient(tmr_mend *m) {
     tmr_clear_flags(m);
-    for (int32_t f = 0; f < m->face_count; f++) {
-        if (!m->flag[f] && !tmr_orient_component(m, f, &bad))
-            return tmr_mend_fail_edge(m, bad, 2);
-    }
+    m->report.cut = 0;
+    for (int32_t f = 0; f < m->face_count; f++)
+        if (!m->flag[f]) tmr_orient_component(m, f);
     tmr_turn_flagged(m);
-    return TXM_OK;
 }
 
 /* Faces without duplicates, at most two at an edge, consistently oriented. */
@@ -952,8 +1163,339 @@ static txm_status tmr_mend_faces(tmr_mend *m) {
     if (status == TXM_OK) status = tmr_mend_edges(m);
     if (status == TXM_OK && m->face_count == 0)
         status = txm_fail(m->env, TXM_TOO_SMALL, "the surface has no area");
-    if (status == TXM_OK) status = tmr_mend_orient(m);
+    if (status == TXM_OK) tmr_mend_orient(m);
     return status;
+}
+
+/* ---- mending: gaps between borders -------------------------------------------------------- */
+
+/* Borders that run along each other but share no edges leave gaps, mostly too narrow to see:
+
+        a-----------b            a-----------b       T-junction: v lies on the side of another face,
+        |           |            |  .     .  |       which is split there
+        |           |            | .       . |
+        a-----v-----b    ->      a-----v-----b
+        |     |     |            |     |     |
+        +-----+-----+            +-----+-----+
+
+   First vertices on borders that are close are welded, then vertices on borders that are close to a
+   border edge are put into it, if then a part of it is an edge of another face. */
+
+#define TMR_CLOSE 1e-5      /* ours: how close, in diagonals                                     */
+#define TMR_CLOSE_EDGES 0.1 /* ours: but no more than this part of the edges there               */
+enum {
+    TMR_LEAST_LEVEL = -40, /* edges shorter than 2^this diagonals are as those of that length  */
+    TMR_CELLS_OF_EDGE = 8  /* an edge is no longer than a cell: two of them each way, at most  */
+};
+
+/* A vertex to be put into the edge opposite to a corner. */
+typedef struct tmr_stitch {
+    int32_t corner, vertex;
+    int32_t next; /* the next one of that edge, farther along; -1 = none             */
+    float along;  /* 0..1 from the vertex of the next corner to that of the previous one */
+} tmr_stitch;
+
+/* Border edges by the cells that they touch. Each level has cells of 2^level diagonals and the edges
+   that are about as long, so that neither long nor short ones fill many cells or one. */
+typedef struct tmr_gaps {
+    double close;       /* how close, in diagonals */
+    double *reach;      /* 1 per vertex: how close in view of the edges there; not on a border: -1 */
+    txm_pair *cell;     /* by key; value: corner */
+    size_t cell_count;
+    uint64_t levels;    /* bit level - TMR_LEAST_LEVEL: there are such edges */
+    tmr_stitch *stitch;
+    size_t stitch_count;
+    int32_t *first;     /* 1 per corner: the first stitch of its edge, -1 = none */
+} tmr_gaps;
+
+static int tmr_is_border(const tmr_mend *m, int32_t c) {
+    return m->opposite[c] == -1;
+}
+
+static double tmr_edge_length(const tmr_mend *m, int32_t c) {
+    return txm_d3_dist(m->point[m->vertex[tmr_next(c)]], m->point[m->vertex[tmr_prev(c)]]);
+}
+
+/* How far each vertex on a border may be from what it is joined with. Returns how many border edges
+   there are. */
+static size_t tmr_gaps_reach(const tmr_mend *m, tmr_gaps *g) {
+    size_t count = 0;
+    for (int32_t v = 0; v < m->vertex_count; v++) g->reach[v] = -1;
+    for (int32_t c = 0; c < 3 * m->face_count; c++) {
+        if (!tmr_is_border(m, c)) continue;
+        g->reach[m->vertex[tmr_next(c)]] = g->reach[m->vertex[tmr_prev(c)]] = g->close;
+        count++;
+    }
+    for (int32_t c = 0; c < 3 * m->face_count; c++) {
+        const double length = tmr_edge_length(m, c), most = TMR_CLOSE_EDGES * length;
+        if (length <= 2 * m->noise) continue; /* in the same place but for rounding */
+        double *a = g->reach + m->vertex[tmr_next(c)], *b = g->reach + m->vertex[tmr_prev(c)];
+        if (*a > most) *a = most;
+        if (*b > most) *b = most;
+    }
+    return count;
+}
+
+/* ---- vertices on edges -------------------------------------------------------------------- */
+
+static uint32_t tmr_gap_key(txm_dvec3 cell, int level) {
+    return (uint32_t)(txm_hash(tmr_hash_cell(cell) + (uint64_t)(level - TMR_LEAST_LEVEL)) >> 32);
+}
+
+/* List the border edges, or count the entries where g->cell is NULL. */
+static void tmr_gaps_fill(const tmr_mend *m, tmr_gaps *g) {
+    g->cell_count = 0;
+    for (int32_t c = 0; c < 3 * m->face_count; c++) {
+        if (!tmr_is_border(m, c)) continue;
+        const txm_dvec3 a = m->point[m->vertex[tmr_next(c)]], b = m->point[m->vertex[tmr_prev(c)]];
+        const double more = g->close;
+        int level = 0;
+        frexp(txm_d3_dist(a, b) + 2 * more, &level); /* which is less than 2^level */
+        if (level < TMR_LEAST_LEVEL) level = TMR_LEAST_LEVEL;
+        const double size = ldexp(1, level);
+        const txm_dvec3 low = tmr_cell(txm_d3(fmin(a.x, b.x) - more, fmin(a.y, b.y) - more,
+                                              fmin(a.z, b.z) - more), size);
+        const txm_dvec3 high = tmr_cell(txm_d3(fmax(a.x, b.x) + more, fmax(a.y, b.y) + more,
+                                               fmax(a.z, b.z) + more), size);
+        g->levels |= (uint64_t)1 << (level - TMR_LEAST_LEVEL);
+        for (int k = 0; k < TMR_CELLS_OF_EDGE; k++) {
+            const txm_dvec3 cell = txm_d3(low.x + (k & 1), low.y + (k >> 1 & 1), low.z + (k >> 2));
+            if (cell.x > high.x || cell.y > high.y || cell.z > high.z) continue;
+            if (g->cell) {
+                g->cell[g->cell_count].key = tmr_gap_key(cell, level);
+                g->cell[g->cell_count].value = (uint32_t)c;
+            }
+            g->cell_count++;
+        }
+    }
+}
+
+/* Does vertex v lie on the edge of corner c, between its ends? */
+static int tmr_lies_on(const tmr_mend *m, const tmr_gaps *g, int32_t v, int32_t c, float *along) {
+    const int32_t i = m->vertex[tmr_next(c)], j = m->vertex[tmr_prev(c)];
+    if (v == i || v == j || v == m->vertex[c]) return 0;
+    const txm_dvec3 a = m->point[i], ab = txm_d3_sub(m->point[j], a);
+    const double length = txm_d3_len(ab), reach = fmin(g->reach[v], TMR_CLOSE_EDGES * length);
+    const txm_dvec3 av = txm_d3_sub(m->point[v], a);
+    const double t = length > 0 ? txm_d3_dot(av, ab) / length : 0;
+    if (!(t > reach && t < length - reach)) return 0;
+    *along = txm_float(t / length);
+    return txm_d3_len2(txm_d3_mad(av, ab, -t / length)) <= reach * reach;
+}
+
+/* Find the vertices on edges. g->stitch NULL: only count them. */
+static void tmr_find_stitches(const tmr_mend *m, tmr_gaps *g) {
+    size_t count = 0;
+    for (int32_t v = 0; v < m->vertex_count; v++) {
+        if (!(g->reach[v] >= 0)) continue;
+        for (int bit = 0; g->levels >> bit; bit++) {
+            const int level = TMR_LEAST_LEVEL + bit;
+            if (!(g->levels >> bit & 1)) continue;
+            const uint32_t key = tmr_gap_key(tmr_cell(m->point[v], ldexp(1, level)), level);
+            size_t low = 0, high = g->cell_count;
+            while (low < high) {
+                const size_t middle = (low + high) / 2;
+                if (g->cell[middle].key < key) low = middle + 1;
+                else high = middle;
+            }
+            for (; low < g->cell_count && g->cell[low].key == key; low++) {
+                const int32_t c = (int32_t)g->cell[low].value;
+                float along = 0;
+                if (!tmr_lies_on(m, g, v, c, &along)) continue;
+                if (g->stitch) {
+                    TRIMESH_ASSERT(count < g->stitch_count);
+                    g->stitch[count].corner = c;
+                    g->stitch[count].vertex = v;
+                    g->stitch[count].along = along;
+                }
+                count++;
+            }
+        }
+    }
+    g->stitch_count = count;
+}
+
+/* ---- which of them join edges ------------------------------------------------------------- */
+
+/* Borders as sets of edges: how often there is each. */
+typedef struct tmr_edge_set {
+    uint64_t *key; /* 0 = free */
+    uint8_t *several;
+    size_t mask;
+} tmr_edge_set;
+
+static size_t tmr_edge_slot(const tmr_edge_set *e, int32_t a, int32_t b) {
+    const uint64_t low = (uint64_t)(a < b ? a : b), high = (uint64_t)(a < b ? b : a);
+    const uint64_t key = (low << 32 | high) + 1;
+    size_t i = (size_t)txm_hash(key) & e->mask;
+    while (e->key[i] && e->key[i] != key) i = (i + 1) & e->mask;
+    if (!e->key[i]) e->key[i] = key;
+    else e->several[i] |= 2; /* 1: it was asked for before; 2: and once more since then */
+    return i;
+}
+
+/* Walk along the parts of the border edge of corner c. count: note them in the set. Else: is one of
+   them part of another border edge, too? */
+static int tmr_walk_parts(const tmr_mend *m, const tmr_gaps *g, const tmr_edge_set *e, int32_t c) {
+    int several = 0;
+    int32_t from = m->vertex[tmr_next(c)];
+    for (int32_t k = g->first[c];; k = g->stitch[k].next) {
+        const int32_t to = k >= 0 ? g->stitch[k].vertex : m->vertex[tmr_prev(c)];
+        several |= e->several[tmr_edge_slot(e, from, to)];
+        from = to;
+        if (k < 0) return several;
+    }
+}
+
+/* List the stitches of each edge along it, and forget those that join nothing. Returns how many are
+   left. */
+static size_t tmr_list_stitches(const tmr_mend *m, tmr_gaps *g, txm_pair *pairs,
+                                const tmr_edge_set *e) {
+    const size_t n = g->stitch_count;
+    size_t kept = 0;
+    for (size_t i = 0; i < n; i++) {
+        pairs[i].key = txm_sort_key(g->stitch[i].along);
+        pairs[i].value = (uint32_t)i;
+    }
+    txm_sort_pairs(pairs, pairs + n, n);
+    for (int32_t c = 0; c < 3 * m->face_count; c++) g->first[c] = -1;
+    for (size_t i = n; i-- > 0;) { /* from the far end, each becomes the first */
+        tmr_stitch *s = g->stitch + pairs[i].value;
+        const int32_t next = g->first[s->corner];
+        if (next >= 0 && g->stitch[next].vertex == s->vertex) continue;
+        s->next = next;
+        g->first[s->corner] = (int32_t)pairs[i].value;
+    }
+    for (int32_t c = 0; c < 3 * m->face_count; c++)
+        if (tmr_is_border(m, c)) tmr_walk_parts(m, g, e, c);
+    for (size_t i = 0; i <= e->mask; i++) e->several[i] = e->several[i] != 0;
+    for (int32_t c = 0; c < 3 * m->face_count; c++) {
+        if (g->first[c] < 0) continue;
+        if (!(tmr_walk_parts(m, g, e, c) & 1)) g->first[c] = -1;
+        for (int32_t k = g->first[c]; k >= 0; k = g->stitch[k].next) kept++;
+    }
+    return kept;
+}
+
+/* ---- splitting faces ---------------------------------------------------------------------- */
+
+/* The stitch in the middle of the longest side of face f that has any; *corner: of that side. The
+   list of the side ends before it, *rest receives what follows it. -1: none. */
+static int32_t tmr_take_stitch(const tmr_mend *m, tmr_gaps *g, int32_t f, int32_t *corner,
+                               int32_t *rest) {
+    double longest = -1;
+    int32_t count = 0;
+    for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
+        if (g->first[c] < 0 || tmr_edge_length(m, c) <= longest) continue;
+        longest = tmr_edge_length(m, c);
+        *corner = c;
+    }
+    if (longest < 0) return -1;
+    for (int32_t k = g->first[*corner]; k >= 0; k = g->stitch[k].next) count++;
+    int32_t *link = g->first + *corner;
+    for (int32_t k = count / 2; k > 0; k--) link = &g->stitch[*link].next;
+    const int32_t taken = *link;
+    *link = -1;
+    *rest = g->stitch[taken].next;
+    return taken;
+}
+
+/* Split faces until no side has stitches left: (p, a, b) at v between a and b into (p, a, v), which
+   stays, and (p, v, b). */
+static void tmr_split_stitched(tmr_mend *m, tmr_gaps *g) {
+    for (int32_t f = 0; f < m->face_count; f++) {
+        int32_t c = 0, rest = -1;
+        for (int32_t k; (k = tmr_take_stitch(m, g, f, &c, &rest)) >= 0;) {
+            const int32_t v = g->stitch[k].vertex, h = m->face_count++;
+            m->vertex[3 * h] = m->vertex[c];
+            m->vertex[3 * h + 1] = v;
+            m->vertex[3 * h + 2] = m->vertex[tmr_prev(c)];
+            m->vertex[tmr_prev(c)] = v;
+            g->first[3 * h] = rest;
+            g->first[3 * h + 1] = g->first[tmr_next(c)]; /* the side from b to p */
+            g->first[3 * h + 2] = -1;
+            g->first[tmr_next(c)] = -1;
+            m->origin[h] = m->origin[f];
+            m->turn[f] = m->turn[h] = TMR_MAPPED;
+            m->twin[h] = m->twin[f];
+        }
+    }
+}
+
+/* Make room for more faces. */
+static txm_status tmr_mend_grow(tmr_mend *m, size_t more) {
+    const tmr_mend old = *m;
+    const size_t n = (size_t)m->face_count;
+    const txm_status status = tmr_mend_alloc_faces(m, n + more);
+    if (status != TXM_OK) return status;
+    memcpy(m->vertex, old.vertex, 3 * n * sizeof *m->vertex);
+    memcpy(m->origin, old.origin, n * sizeof *m->origin);
+    memcpy(m->turn, old.turn, n);
+    memcpy(m->twin, old.twin, n);
+    return TXM_OK;
+}
+
+/* Put vertices into the edges on which they lie. border: how many border edges there are. */
+static txm_status tmr_stitch_edges(tmr_mend *m, tmr_gaps *g, size_t border) {
+    static const char no_memory[] = "no memory to close gaps of the surface";
+    tmr_edge_set e;
+    tmr_gaps_fill(m, g); /* counts */
+    g->cell = (txm_pair *)txm_arena_alloc(m->scratch, 2 * g->cell_count, sizeof(txm_pair));
+    if (!g->cell) return txm_fail(m->env, TXM_OUT_OF_MEMORY, no_memory);
+    tmr_gaps_fill(m, g);
+    txm_sort_pairs(g->cell, g->cell + g->cell_count, g->cell_count);
+    tmr_find_stitches(m, g); /* counts */
+    const size_t n = g->stitch_count, corners = 3 * ((size_t)m->face_count + n);
+    if (n == 0) return TXM_OK;
+    if (n > (size_t)TMR_MOST_SLOTS - (size_t)m->face_count)
+        return txm_fail(m->env, TXM_TOO_LARGE, "too many vertices lie on edges of other faces");
+    for (e.mask = 16; e.mask < 2 * (border + n); e.mask *= 2) {}
+    e.key = (uint64_t *)txm_arena_zero(m->scratch, e.mask, sizeof(uint64_t));
+    e.several = (uint8_t *)txm_arena_zero(m->scratch, e.mask, 1);
+    g->stitch = (tmr_stitch *)txm_arena_alloc(m->scratch, n, sizeof(tmr_stitch));
+    g->first = (int32_t *)txm_arena_alloc(m->scratch, corners, sizeof(int32_t));
+    txm_pair *pairs = (txm_pair *)txm_arena_alloc(m->scratch, 2 * n, sizeof(txm_pair));
+    if (m->scratch->failed) return txm_fail(m->env, TXM_OUT_OF_MEMORY, no_memory);
+    e.mask--;
+    tmr_find_stitches(m, g);
+    m->report.stitched = tmr_list_stitches(m, g, pairs, &e);
+    if (m->report.stitched == 0) return TXM_OK;
+    const txm_status status = tmr_mend_grow(m, m->report.stitched);
+    if (status == TXM_OK) tmr_split_stitched(m, g);
+    return status;
+}
+
+/* ---- both --------------------------------------------------------------------------------- */
+
+/* Weld the vertices on borders that are close. Returns how many were. */
+static size_t tmr_weld_borders(tmr_mend *m, const tmr_gaps *g) {
+    const size_t before = m->report.welded;
+    tmr_weld(m, g->close, g->reach);
+    const size_t welded = m->report.welded - before;
+    for (int32_t c = 0; c < 3 * m->face_count && welded > 0; c++)
+        m->vertex[c] = m->rename[m->vertex[c]];
+    return welded;
+}
+
+/* Close gaps, unless nothing shall be welded. */
+static txm_status tmr_mend_gaps(tmr_mend *m) {
+    tmr_gaps g;
+    memset(&g, 0, sizeof g);
+    tmr_mend_compact(m);
+    tmr_mend_duplicates(m);
+    if (m->desc->weld < 0) return TXM_OK;
+    g.close = m->desc->weld > 0 ? m->desc->weld : fmin(fmax(TMR_CLOSE, 4 * m->noise), 0.01);
+    g.reach = (double *)txm_arena_alloc(m->scratch, (size_t)m->vertex_count, sizeof(double));
+    if (!g.reach) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to close gaps");
+    tmr_mend_opposites(m);
+    size_t border = tmr_gaps_reach(m, &g);
+    if (border > 0 && !(m->desc->weld > 0) && (m->report.closed = tmr_weld_borders(m, &g)) > 0) {
+        tmr_mend_compact(m);
+        tmr_mend_duplicates(m);
+        tmr_mend_opposites(m);
+        border = tmr_gaps_reach(m, &g);
+    }
+    return border > 0 ? tmr_stitch_edges(m, &g, border) : TXM_OK;
 }
 
 /* ---- mending: triangles without area ------------------------------------------------------ */
@@ -1254,6 +1796,123 @@ static txm_status tmr_mend_finish(tmr_mend *m, txm_arena *arena, tmr_surface *s)
     return TXM_OK;
 }
 
+/* ---- mending: several edges between two vertices ------------------------------------------ */
+
+/* Where the faces of an edge were paired, or a one-sided surface was cut, both edges may still run
+   between the same two vertices. The mesh that changes tells edges by their ends, so such edges get a
+   vertex in the middle. (Two border edges of that kind would also be a loop of two.) */
+
+/* Mark the corners of such edges, 1 each in mark. Returns how many corners. */
+static size_t tmr_find_doubles(const tmr_mend *m, const tmr_surface *s, uint8_t *mark) {
+    txm_mesh mesh;
+    size_t count = 0;
+    memset(&mesh, 0, sizeof mesh);
+    mesh.indices = (const uint32_t *)s->vertex;
+    mesh.vertex_count = (size_t)s->vertex_count;
+    mesh.face_count = (size_t)s->face_count;
+    txm_mesh_sort_sides(&mesh, m->sides);
+    memset(mark, 0, 3 * (size_t)s->face_count);
+    for (size_t i = 0, end; i < txm_mesh_sides(&mesh); i = end) {
+        const int32_t c = tmr_opposite_corner(m, (int32_t)i);
+        end = txm_mesh_edge_end(&mesh, m->sides, i);
+        if (end - i == 1 || (end - i == 2 && s->opposite[c] >= 0)) continue;
+        for (size_t k = i; k < end; k++) mark[tmr_opposite_corner(m, (int32_t)k)] = 1;
+        count += end - i;
+    }
+    return count;
+}
+
+/* Split face (p, a, b) of corner c at p into (p, a, v), which stays, and a new one, (p, v, b). Returns
+   the corner at p of the new one. */
+static int32_t tmr_halve_face(tmr_surface *s, int32_t c, int32_t v, uint8_t *mark) {
+    const int32_t f = c / 3, n = 3 * s->face_count++, next = tmr_next(c), prev = tmr_prev(c);
+    s->vertex[n] = s->vertex[c];
+    s->vertex[n + 1] = v;
+    s->vertex[n + 2] = s->vertex[prev];
+    s->vertex[prev] = v;
+    s->opposite[n + 1] = s->opposite[next]; /* from b to p */
+    if (s->opposite[next] >= 0) s->opposite[s->opposite[next]] = n + 1;
+    s->opposite[next] = n + 2; /* from p to v */
+    s->opposite[n + 2] = next;
+    mark[n + 1] = mark[next];
+    mark[c] = mark[next] = mark[n] = mark[n + 2] = 0;
+    s->origin[n / 3] = s->origin[f];
+    s->turn[n / 3] = s->turn[f] = TMR_MAPPED;
+    return n;
+}
+
+/* Put a vertex into the middle of the edge of corner c. */
+static void tmr_halve_edge(tmr_surface *s, int32_t c, uint8_t *mark) {
+    const int32_t o = s->opposite[c], v = s->vertex_count++;
+    const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
+    s->point[v] = txm_d3_scale(txm_d3_add(s->point[a], s->point[b]), 0.5);
+    if (s->scale) s->scale[v] = txm_float(0.5 * (s->scale[a] + (double)s->scale[b]));
+    const int32_t c2 = tmr_halve_face(s, c, v, mark); /* c: a to v, c2: v to b */
+    s->opposite[c] = s->opposite[c2] = -1;
+    if (o < 0) return;
+    const int32_t o2 = tmr_halve_face(s, o, v, mark); /* o: b to v, o2: v to a */
+    s->opposite[c] = o2;
+    s->opposite[o2] = c;
+    s->opposite[c2] = o;
+    s->opposite[o] = c2;
+}
+
+/* Copies of the arrays of the surface with room for more faces and vertices. */
+static txm_status tmr_surface_grow(tmr_surface *s, size_t faces, size_t vertices,
+                                   txm_arena *arena) {
+    const tmr_surface old = *s;
+    const size_t f = (size_t)s->face_count, v = (size_t)s->vertex_count;
+    s->vertex = (int32_t *)txm_arena_alloc(arena, 3 * (f + faces), sizeof(int32_t));
+    s->opposite = (int32_t *)txm_arena_alloc(arena, 3 * (f + faces), sizeof(int32_t));
+    s->origin = (uint32_t *)txm_arena_alloc(arena, f + faces, sizeof(uint32_t));
+    s->turn = (uint8_t *)txm_arena_alloc(arena, f + faces, 1);
+    s->edge_kind = (uint8_t *)txm_arena_zero(arena, 3 * (f + faces), 1);
+    s->point = (txm_dvec3 *)txm_arena_alloc(arena, v + vertices, sizeof(txm_dvec3));
+    s->corner = (int32_t *)txm_arena_alloc(arena, v + vertices, sizeof(int32_t));
+    if (s->scale) s->scale = (float *)txm_arena_alloc(arena, v + vertices, sizeof(float));
+    if (arena->failed) return TXM_OUT_OF_MEMORY;
+    memcpy(s->vertex, old.vertex, 3 * f * sizeof *s->vertex);
+    memcpy(s->opposite, old.opposite, 3 * f * sizeof *s->opposite);
+    memcpy(s->origin, old.origin, f * sizeof *s->origin);
+    memcpy(s->turn, old.turn, f);
+    memcpy(s->point, old.point, v * sizeof *s->point);
+    if (s->scale) memcpy(s->scale, old.scale, v * sizeof *s->scale);
+    return TXM_OK;
+}
+
+/* One corner of each vertex, and the kinds of edges, as tmr_surface has them. */
+static void tmr_surface_corners(tmr_surface *s) {
+    for (int32_t v = 0; v < s->vertex_count; v++) s->corner[v] = -1;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) {
+        s->edge_kind[c] = (uint8_t)(s->opposite[c] < 0 ? TMR_BORDER_EDGE : TMR_PLAIN_EDGE);
+        if (s->corner[s->vertex[c]] < 0 || tmr_cw(s->opposite, c) < 0)
+            s->corner[s->vertex[c]] = c;
+    }
+}
+
+/* Split the edges of which there are several between two vertices of the numbered surface. */
+static txm_status tmr_split_doubles(tmr_mend *m, txm_arena *arena, tmr_surface *s) {
+    static const char no_memory[] = "no memory for the surface";
+    uint8_t *mark = (uint8_t *)txm_arena_alloc(m->scratch, 3 * (size_t)s->face_count, 1);
+    if (!mark) return txm_fail(m->env, TXM_OUT_OF_MEMORY, no_memory);
+    /* each corner that is marked gets a face more, and each edge, which has one or two, a vertex */
+    const size_t more = tmr_find_doubles(m, s, mark), f = (size_t)s->face_count;
+    if (more == 0) return TXM_OK;
+    if (f + more > TMR_MOST_SLOTS || (size_t)s->vertex_count + more > TMR_MOST_SLOTS)
+        return txm_fail(m->env, TXM_TOO_LARGE, "the surface has too many edges of several faces");
+    uint8_t *marks = (uint8_t *)txm_arena_zero(m->scratch, 3 * (f + more), 1);
+    if (!marks || tmr_surface_grow(s, more, more, arena) != TXM_OK)
+        return txm_fail(m->env, TXM_OUT_OF_MEMORY, no_memory);
+    memcpy(marks, mark, 3 * f);
+    for (int32_t c = 0; c < 3 * s->face_count; c++)
+        if (marks[c]) tmr_halve_edge(s, c, marks);
+    TRIMESH_ASSERT((size_t)s->face_count == f + more);
+    tmr_surface_corners(s);
+    m->report.vertices = (size_t)s->vertex_count;
+    m->report.triangles = (size_t)s->face_count;
+    return TXM_OK;
+}
+
 /* ---- the surface: normals and topology ---------------------------------------------------- */
 
 /* Normals of faces without area: the mean of their neighbours', from the rim of such a region
@@ -1395,18 +2054,22 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
     if (status != TXM_OK) return status;
     m->vertex_count = (int32_t)m->desc->surface.vertex_count;
     m->face_count = (int32_t)m->desc->surface.face_count;
+    m->arena = arena;
+    m->scratch = scratch;
     m->point = (txm_dvec3 *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(txm_dvec3));
     if (!m->point) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
-    if ((status = tmr_mend_alloc(m, arena, scratch)) != TXM_OK) return status;
+    if ((status = tmr_mend_alloc(m)) != TXM_OK) return status;
     if ((status = tmr_mend_cancel(m, 0)) != TXM_OK) return status;
     if ((status = tmr_mend_scale(m)) != TXM_OK) return status;
-    tmr_weld(m);
+    if (m->desc->weld >= 0) tmr_weld(m, m->desc->weld, NULL);
     if ((status = tmr_mend_cancel(m, 0.01f)) != TXM_OK) return status;
     tmr_mend_load(m);
+    if ((status = tmr_mend_gaps(m)) != TXM_OK) return status;
     if ((status = tmr_mend_faces(m)) != TXM_OK) return status;
     if ((status = tmr_mend_thin(m)) != TXM_OK) return status;
     if ((status = tmr_mend_cancel(m, 0.03f)) != TXM_OK) return status;
     if ((status = tmr_mend_finish(m, arena, s)) != TXM_OK) return status;
+    if ((status = tmr_split_doubles(m, arena, s)) != TXM_OK) return status;
     txm_arena_free(scratch);
     txm_arena_free(places);
     if ((status = tmr_mend_cancel(m, 0.04f)) != TXM_OK) return status;
@@ -1417,7 +2080,7 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
 
    arena   receives what the surface keeps, also part of it after an error: free it then
    report  NULL, or receives what was found, also after an error
-   return  TXM_OK; TXM_BAD_ARGUMENT; TXM_BAD_DATA; TXM_TOO_SMALL without area or faces;
+   return  TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_SMALL without area or faces;
            TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost    O(n) time; about 130 bytes per triangle of a closed mesh, 85 of them kept         */
 static txm_status tmr_surface_build(const trimesh_desc *desc, txm_env *env, txm_arena *arena,
@@ -2288,6 +2951,197 @@ static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, 
     }
     s->scale = scale;
     return TXM_OK;
+}
+
+/* ---- pieces: how many vertices each needs, and which are dropped --------------------------- */
+
+/* Scans have crumbs: pieces so small that their share of the vertices is less than any piece needs.
+   Hundreds of them would take the vertices of the body. So the largest are kept while what they take
+   beyond their share stays small, and the others are dropped. If there is no body, that is, if crumbs
+   are a good part of the surface, all are kept. */
+
+#define TMR_CRUMB 4         /* ours: vertices that a piece is worth by its area                  */
+#define TMR_CRUMB_ROOM 0.05 /* ours: part of the vertices that crumbs may take beyond their share */
+#define TMR_CRUMB_FEW 16    /* ours: or so many, if they are at most                             */
+#define TMR_CRUMB_PART 0.25 /* this part of all                                                  */
+#define TMR_CRUMB_AREA 0.1  /* ours: part of the surface that is dropped at most                 */
+
+typedef struct tmr_piece {
+    double area;   /* scaled units */
+    double volume; /* inside: its part of that of the surface                */
+    double weight; /* area relative to the square of the wanted edge length */
+    double euler;  /* characteristic, its border loops not closed            */
+    double loops;  /* border loops */
+    double fixed;  /* vertices that its lines need at least: corners, and more on loops */
+    double least;  /* vertices that it needs at least */
+    int is_dropped;
+} tmr_piece;
+
+/* The least number of vertices for a piece. Closed, Heawood's bound: 4 for a sphere, 7 for a torus;
+   each border loop has 3 of its own. */
+static double tmr_piece_least(const tmr_piece *p) {
+    const double heawood = ceil((7 + sqrt(fmax(49 - 24 * (p->euler + p->loops), 1))) / 2);
+    return fmax(p->fixed, p->loops > 0 ? 3 * p->loops : heawood);
+}
+
+static txm_status tmr_measure_pieces(const tmr_surface *s, const tmr_lines *l, tmr_piece *pieces,
+                                     txm_arena *scratch) {
+    uint8_t *seen = (uint8_t *)txm_arena_zero(scratch, 3 * (size_t)s->face_count, 1);
+    if (!seen) return TXM_OUT_OF_MEMORY;
+    memset(pieces, 0, (size_t)s->component_count * sizeof *pieces);
+    for (int32_t f = 0; f < s->face_count; f++) {
+        const int32_t *v = s->vertex + 3 * f;
+        tmr_piece *p = pieces + s->component[f];
+        const double area =
+            0.5 * txm_d3_len(txm_d3_area2(s->point[v[0]], s->point[v[1]], s->point[v[2]]));
+        const double size =
+            s->scale ? (s->scale[v[0]] + (double)s->scale[v[1]] + s->scale[v[2]]) / 3 : 1;
+        p->area += area;
+        p->volume += txm_d3_dot(s->point[v[0]], txm_d3_area2(s->point[v[0]], s->point[v[1]],
+                                                             s->point[v[2]])) / 6;
+        p->weight += area / (size * size);
+        p->euler -= 0.5; /* a face and its three halves of edges; 1/2 more for each border edge */
+        for (int32_t c = 3 * f; c < 3 * f + 3; c++) {
+            if (s->opposite[c] >= 0) continue;
+            p->euler -= 0.5;
+            p->loops += !seen[c];
+            for (int32_t k = c; !seen[k]; k = tmr_next_border(s, k)) seen[k] = 1;
+        }
+    }
+    for (int32_t v = 0; v < s->vertex_count; v++) {
+        tmr_piece *p = pieces + s->component[s->corner[v] / 3];
+        p->euler++;
+        p->fixed += l->kind[v] == TRIMESH_CORNER;
+    }
+    for (int32_t i = 0; i < l->line_count; i++) { /* a loop has three edges */
+        const int32_t first = l->first[i], last = l->first[i + 1] - 1;
+        tmr_piece *p = pieces + s->component[l->face[first]];
+        p->fixed += l->closed[i] ? 3 : l->a[first] == l->b[last] ? 2 : 0;
+    }
+    for (int32_t i = 0; i < s->component_count; i++) pieces[i].least = tmr_piece_least(pieces + i);
+    return TXM_OK;
+}
+
+/* Choose the crumbs to be dropped. all: the weight of all pieces. */
+static txm_status tmr_choose_crumbs(const tmr_surface *s, double vertices, double all,
+                                    tmr_piece *pieces, txm_arena *scratch) {
+    const size_t n = (size_t)s->component_count;
+    txm_pair *order = (txm_pair *)txm_arena_alloc(scratch, 2 * n, sizeof(txm_pair));
+    const double room =
+        fmax(TMR_CRUMB_ROOM * vertices, fmin(TMR_CRUMB_FEW, TMR_CRUMB_PART * vertices));
+    double more = 0, crumbs = 0;
+    size_t count = 0;
+    if (!order) return TXM_OUT_OF_MEMORY;
+    for (size_t i = 0; i < n; i++) {
+        const double worth = pieces[i].weight / all * vertices;
+        if (pieces[i].is_dropped || worth >= TMR_CRUMB) continue;
+        order[count].key = ~txm_sort_key(txm_float(pieces[i].weight)); /* the largest first */
+        order[count++].value = (uint32_t)i;
+        more += fmax(pieces[i].least - worth, 0);
+        crumbs += pieces[i].weight;
+    }
+    if (more <= room || crumbs > TMR_CRUMB_AREA * all) return TXM_OK;
+    txm_sort_pairs(order, order + n, count);
+    more = 0;
+    for (size_t i = 0; i < count; i++) {
+        tmr_piece *p = pieces + order[i].value;
+        more += fmax(p->least - p->weight / all * vertices, 0);
+        p->is_dropped = more > room;
+    }
+    return TXM_OK;
+}
+
+/* Remove the pieces that are dropped from the surface. */
+static txm_status tmr_drop_pieces(tmr_surface *s, const tmr_piece *pieces, trimesh_report *report,
+                                  txm_arena *scratch) {
+    const size_t n = (size_t)s->face_count;
+    int32_t *face = (int32_t *)txm_arena_alloc(scratch, n, sizeof(int32_t));
+    int32_t *vertex = (int32_t *)txm_arena_alloc(scratch, (size_t)s->vertex_count, sizeof(int32_t));
+    int32_t *piece =
+        (int32_t *)txm_arena_alloc(scratch, (size_t)s->component_count, sizeof(int32_t));
+    int32_t faces = 0, vertices = 0, count = 0;
+    if (!face || !vertex || !piece) return TXM_OUT_OF_MEMORY;
+    for (int32_t i = 0; i < s->component_count; i++)
+        piece[i] = pieces[i].is_dropped ? -1 : count++;
+    for (int32_t f = 0; f < s->face_count; f++)
+        face[f] = piece[s->component[f]] < 0 ? -1 : faces++;
+    for (int32_t v = 0; v < s->vertex_count; v++)
+        vertex[v] = face[s->corner[v] / 3] < 0 ? -1 : vertices++;
+    for (int32_t v = 0; v < s->vertex_count; v++) { /* downwards only: nothing is overwritten early */
+        const int32_t to = vertex[v];
+        if (to < 0) continue;
+        s->point[to] = s->point[v];
+        s->vertex_normal[to] = s->vertex_normal[v];
+        s->corner[to] = 3 * face[s->corner[v] / 3] + s->corner[v] % 3;
+        if (s->scale) s->scale[to] = s->scale[v];
+    }
+    for (int32_t f = 0; f < s->face_count; f++) {
+        const int32_t to = face[f];
+        if (to < 0) continue;
+        for (int32_t k = 0; k < 3; k++) {
+            const int32_t o = s->opposite[3 * f + k];
+            s->vertex[3 * to + k] = vertex[s->vertex[3 * f + k]];
+            s->opposite[3 * to + k] = o < 0 ? -1 : 3 * face[o / 3] + o % 3;
+            if (s->section) s->section[3 * to + k] = s->section[3 * f + k];
+        }
+        s->normal[to] = s->normal[f];
+        s->component[to] = piece[s->component[f]];
+        s->origin[to] = s->origin[f];
+        s->turn[to] = s->turn[f];
+    }
+    for (int32_t i = 0; i < s->component_count; i++) {
+        const tmr_piece *p = pieces + i;
+        if (!p->is_dropped) continue;
+        s->volume -= p->volume;
+        report->dropped++;
+        report->dropped_area += p->area / s->area;
+        report->euler -= (long)floor(p->euler + 0.5);
+        report->loops -= (size_t)p->loops;
+    }
+    s->area *= 1 - report->dropped_area;
+    s->border_count = 0;
+    for (int32_t c = 0; c < 3 * faces; c++) s->border_count += s->opposite[c] < 0;
+    s->loop_count = (int32_t)report->loops;
+    s->face_count = faces;
+    s->vertex_count = vertices;
+    s->component_count = count;
+    report->components = (size_t)count;
+    report->vertices = (size_t)vertices;
+    report->triangles = (size_t)faces;
+    return TXM_OK;
+}
+
+/* Drop the pieces below the caller's share of the area, and crumbs.
+
+   vertices  of the result
+   again     non-zero: this was done before; only count
+   least     receives how many vertices the others need at least
+   dropped   receives non-zero if any was dropped: then the lines must be built again         */
+static txm_status tmr_settle_pieces(tmr_surface *s, const tmr_lines *l, const trimesh_desc *desc,
+                                    double vertices, trimesh_report *report, txm_arena *scratch,
+                                    int again, double *least, int *dropped) {
+    tmr_piece *pieces =
+        (tmr_piece *)txm_arena_alloc(scratch, (size_t)s->component_count, sizeof(tmr_piece));
+    double all = 0;
+    int32_t largest = 0;
+    if (!pieces) return TXM_OUT_OF_MEMORY;
+    txm_status status = tmr_measure_pieces(s, l, pieces, scratch);
+    if (status != TXM_OK) return status;
+    for (int32_t i = 0; i < s->component_count; i++)
+        if (pieces[i].area > pieces[largest].area) largest = i;
+    for (int32_t i = 0; i < s->component_count; i++) { /* one is always kept */
+        pieces[i].is_dropped = !again && i != largest && pieces[i].area < desc->drop_below * s->area;
+        all += pieces[i].is_dropped ? 0 : pieces[i].weight;
+    }
+    if (!again) status = tmr_choose_crumbs(s, vertices, all, pieces, scratch);
+    if (status != TXM_OK) return status;
+    *least = 0;
+    *dropped = 0;
+    for (int32_t i = 0; i < s->component_count; i++) {
+        *least += pieces[i].is_dropped ? 0 : pieces[i].least;
+        *dropped |= pieces[i].is_dropped;
+    }
+    return *dropped ? tmr_drop_pieces(s, pieces, report, scratch) : TXM_OK;
 }
 
 /* ---- the mesh that changes ---------------------------------------------------------------- */
@@ -5246,6 +6100,63 @@ static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
     return 0;
 }
 
+#define TMR_TOUCH 1e-6 /* ours: distance, in diagonals, of what touches */
+
+/* squared distance of the segments a b and c d */
+static double tmr_segments_dist2(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 d) {
+    const txm_dvec3 u = txm_d3_sub(b, a), v = txm_d3_sub(d, c), w = txm_d3_sub(a, c);
+    const double uu = txm_d3_len2(u), vv = txm_d3_len2(v), uv = txm_d3_dot(u, v);
+    const double uw = txm_d3_dot(u, w), vw = txm_d3_dot(v, w), det = uu * vv - uv * uv;
+    double s = det > 1e-12 * uu * vv ? (uv * vw - vv * uw) / det : 0;
+    s = fmin(fmax(s, 0), 1);
+    double t = vv > 0 ? (uv * s + vw) / vv : 0;
+    if (t < 0 || t > 1) { /* beyond an end: that end, and the place on a b nearest to it */
+        t = t < 0 ? 0 : 1;
+        s = uu > 0 ? fmin(fmax((uv * t - uw) / uu, 0), 1) : 0;
+    }
+    return txm_d3_dist2(txm_d3_mad(a, u, s), txm_d3_mad(c, v, t));
+}
+
+static int tmr_point_touches(txm_dvec3 p, const txm_dvec3 t[3]) {
+    double u, v;
+    int part;
+    return txm_d3_dist2(p, tmr_nearest(p, t[0], t[1], t[2], &u, &v, &part)) < TMR_TOUCH * TMR_TOUCH;
+}
+
+/* Do two triangles touch away from the vertices that they share? So do cards and boxes that stand on
+   one another, sheets that lie on each other, and what was separated along an edge. */
+static int tmr_faces_touch(const tmr_mesh *m, int32_t f, int32_t g) {
+    txm_dvec3 p[2][3];
+    int alone[2][3] = {{1, 1, 1}, {1, 1, 1}}; /* not shared */
+    for (int i = 0; i < 3; i++) {
+        p[0][i] = m->p[m->vertex[3 * f + i]];
+        p[1][i] = m->p[m->vertex[3 * g + i]];
+        for (int j = 0; j < 3; j++)
+            if (m->vertex[3 * f + i] == m->vertex[3 * g + j]) alone[0][i] = alone[1][j] = 0;
+    }
+    for (int k = 0; k < 2; k++) { /* a triangle without area touches its neighbours anyway */
+        const double longest = fmax(txm_d3_dist2(p[k][0], p[k][1]),
+                                    fmax(txm_d3_dist2(p[k][1], p[k][2]),
+                                         txm_d3_dist2(p[k][2], p[k][0])));
+        if (txm_d3_len(txm_d3_area2(p[k][0], p[k][1], p[k][2])) <= 10 * TMR_TOUCH * sqrt(longest))
+            return 0;
+    }
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < 3; i++)
+            if (alone[k][i] && tmr_point_touches(p[k][i], p[1 - k])) return 1;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) { /* edges without a shared end */
+            const int i2 = (i + 1) % 3, j2 = (j + 1) % 3;
+            const int32_t a = m->vertex[3 * f + i], b = m->vertex[3 * f + i2];
+            const int32_t c = m->vertex[3 * g + j], d = m->vertex[3 * g + j2];
+            if (a == c || a == d || b == c || b == d) continue;
+            if (tmr_segments_dist2(p[0][i], p[0][i2], p[1][j], p[1][j2]) < TMR_TOUCH * TMR_TOUCH)
+                return 1;
+        }
+    }
+    return 0;
+}
+
 /* Triangles by the cells of a grid that their bounding boxes touch: hashed cells, sorted. */
 typedef struct tmr_cells {
     double cell;
@@ -5330,12 +6241,24 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *nearby, tmr_c
     return TXM_OK;
 }
 
+/* Is this the cell in which the boxes of two triangles, with these low corners, overlap first? There
+   are others, where the pair need not be looked at again. */
+static int tmr_is_first_cell(const tmr_cells *g, uint32_t key, txm_dvec3 a, txm_dvec3 b) {
+    return key == tmr_cell_key((int32_t)floor(fmax(a.x, b.x) / g->cell),
+                               (int32_t)floor(fmax(a.y, b.y) / g->cell),
+                               (int32_t)floor(fmax(a.z, b.z) / g->cell));
+}
+
+enum { TMR_COUNT_CROSSING, TMR_ANY_CROSSING, TMR_ANY_TOUCHING }; /* what tmr_count_crossings does */
+
 /* Count the pairs of triangles that cross each other in *found, and mark their vertices in w->bad.
-   near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
-   Linear in the number of triangles. */
-static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int rim,
+   near: where to look, as tmr_mark_near has it; NULL = everywhere. what: TMR_ANY_CROSSING stops at the
+   first one, TMR_ANY_TOUCHING also at the first that touch. Linear in the number of triangles. */
+static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int what,
                                       txm_arena *scratch, long *found) {
     const tmr_mesh *m = &w->m;
+    const int rim = what == TMR_ANY_TOUCHING;
+    const double slack = rim ? TMR_TOUCH : 0;
     tmr_cells g;
     *found = 0;
     const txm_status status = tmr_cells_make(w, nearby, &g, scratch);
@@ -5352,10 +6275,16 @@ static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int ri
                 txm_dvec3 low2, high2;
                 if (f == h) continue;
                 tmr_face_box(m, h, &low2, &high2);
-                if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
-                    low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h, rim))
+                if (low.x > high2.x + slack || low2.x > high.x + slack ||
+                    low.y > high2.y + slack || low2.y > high.y + slack ||
+                    low.z > high2.z + slack || low2.z > high.z + slack)
                     continue;
+                if (what != TMR_COUNT_CROSSING &&
+                    !tmr_is_first_cell(&g, g.entry[i].key, low, low2))
+                    continue;
+                if (!tmr_faces_cross(m, f, h, rim) && !(rim && tmr_faces_touch(m, f, h))) continue;
                 ++*found;
+                if (what != TMR_COUNT_CROSSING) return TXM_OK;
                 for (int k = 0; k < 3; k++)
                     w->bad[m->vertex[3 * f + k]] = w->bad[m->vertex[3 * h + k]] = 1;
             }
@@ -5535,7 +6464,8 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
         if (round > 0) tmr_mark_near(w, nearby); /* w->bad: what was moved */
         memset(w->bad, 0, count);
         txm_arena_init(&scratch, w->env);
-        status = tmr_count_crossings(w, round > 0 ? nearby : NULL, 0, &scratch, &crossings);
+        status = tmr_count_crossings(w, round > 0 ? nearby : NULL, TMR_COUNT_CROSSING, &scratch,
+                                     &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
         const long turned = tmr_count_inverted(w, &doubtful);
@@ -5663,7 +6593,7 @@ static double tmr_sampling_length(const tmr_surface *s, const tmr_lines *l, doub
 /* How many edges a line is cut into: by its length, and so many that no two edges coincide. */
 static int32_t tmr_line_steps(const tmr_sampling *t, int32_t line) {
     const tmr_lines *l = t->w->l;
-    const double spacing = t->length * (t->desc->line_spacing > 0 ? t->desc->line_spacing : 1);
+    const double spacing = t->length * t->w->line_scale;
     const double steps = floor(tmr_line_weight(t->w->s, l, line) / spacing + 0.5);
     const int32_t a = l->a[l->first[line]], b = l->b[l->first[line + 1] - 1];
     const int32_t least = a == b ? 3 : 1;
@@ -6116,25 +7046,18 @@ static txm_status tmr_sampling_alloc(tmr_sampling *t, txm_arena *scratch) {
     return TXM_OK;
 }
 
-/* Corners and the points on lines. */
+/* Corners and the points on lines. TXM_TOO_SMALL: there is no room for so many. */
 static txm_status tmr_sample_lines(tmr_sampling *t) {
     const tmr_surface *s = t->w->s;
     const tmr_lines *l = t->w->l;
     const tmr_mesh *m = &t->w->m;
-    uint64_t points = 0;
     for (int32_t v = 0; v < s->vertex_count; v++) t->keep[v] = l->kind[v] == TRIMESH_CORNER;
     for (int32_t i = 0; i < l->line_count; i++) {
         const int32_t steps = tmr_line_steps(t, i), first = l->closed[i] ? 0 : 1;
         const double step = tmr_line_weight(s, l, i) / steps;
         for (int32_t k = first; k < steps; k++) t->ways[k - first] = k * step;
-        if (tmr_cut_line(t, i, t->ways, steps - first, NULL) != TXM_OK) {
-            for (; i < l->line_count; i++) points += (uint64_t)tmr_line_steps(t, i);
-            return txm_fail_numbers(t->w->env, TXM_TOO_SMALL,
-                                    "# vertices are too few for creases and borders alone; give "
-                                    "about #, or a larger line_spacing",
-                                    t->desc->vertices, points);
-        }
-        points += (uint64_t)steps;
+        const txm_status status = tmr_cut_line(t, i, t->ways, steps - first, NULL);
+        if (status != TXM_OK) return status;
     }
     for (int32_t v = 0; v < m->vertex_count; v++)
         if (t->keep[v]) t->fixed[s->component[tmr_face_of(t->w, v)]]++;
@@ -6150,7 +7073,7 @@ static txm_status tmr_sample(tmr_sampling *t, tmr_work *w, const trimesh_desc *d
     t->w = w;
     t->desc = desc;
     t->length = w->length =
-        tmr_sampling_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
+        tmr_sampling_length(w->s, w->l, w->line_scale, total);
     txm_status status = tmr_sampling_alloc(t, scratch);
     if (status != TXM_OK) return status;
     tmr_least_points(t);
@@ -6537,6 +7460,9 @@ struct trimesh_job {
     int plain;             /* strips are left as they are: ridges.h                              */
     int retries;           /* with adapted density so far                                       */
     float *plain_scale;    /* scale before the retries                                          */
+    uint64_t wanted;       /* after TXM_TOO_SMALL: how many vertices may do                     */
+    uint8_t crosses[2];    /* the surface crosses, or touches itself: 0 = not known, 1 = no, 2 = yes */
+    int is_trial;          /* to find out whether so many vertices do: one attempt, no hint      */
     int cut; /* how often the number is quartered, then triangles cut in four          */
     tmr_surface s;
     tmr_lines l;
@@ -6565,6 +7491,8 @@ static txm_status tmr_check_desc(const trimesh_desc *desc, txm_env *env) {
     if (!(desc->line_spacing >= 0.25f && desc->line_spacing <= 4) &&
         !(desc->line_spacing >= 0 && desc->line_spacing <= 0))
         return txm_fail(env, TXM_BAD_ARGUMENT, "line_spacing must be 0.25 to 4, or 0");
+    if (!(desc->drop_below >= 0 && desc->drop_below <= 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "drop_below must be 0 to 1");
     if (desc->iterations < 0 || desc->iterations > 1000)
         return txm_fail(env, TXM_BAD_ARGUMENT, "iterations must be 0 to 1000");
     return TXM_OK;
@@ -6575,21 +7503,27 @@ static double tmr_job_spacing(const trimesh_job *job) {
     return tmr_spacing(&job->s, (double)job->desc.vertices);
 }
 
-/* Are the vertices fewer than any such surface needs? A closed piece needs 4, one with handles as
-   many as Heawood's bound says, an open one 3. */
-static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
-    const trimesh_report *r = &job->report;
-    char text[160];
-    double least = 3.0 * (double)r->components + (r->loops == 0 ? (double)r->components : 0);
-    if (r->components == 1 && r->loops == 0 && r->euler < 2)
-        least = ceil((7 + sqrt(49 - 24.0 * (double)r->euler)) / 2);
-    if ((double)job->desc.vertices >= least) return TXM_OK;
-    snprintf(text, sizeof text, "%ld vertices are too few for %ld pieces of Euler characteristic %ld;"
-             " give %.0f or more", (long)job->desc.vertices, (long)r->components, r->euler, least);
-    return txm_fail(env, TXM_TOO_SMALL, text);
-}
-
 /* ---- the stages: each sets the next one ----------------------------------------------------- */
+
+/* Find the lines; drop pieces, and then find them again. */
+static txm_status tmr_job_lines(trimesh_job *job, float angle) {
+    const size_t vertices = job->desc.vertices;
+    double least = 0;
+    int dropped = 1;
+    for (int round = 0; dropped && round < 2; round++) {
+        txm_status status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job),
+                                            &job->input, &job->scratch, &job->report, &job->l);
+        if (status == TXM_OK)
+            status = tmr_settle_pieces(&job->s, &job->l, &job->desc, (double)vertices,
+                                       &job->report, &job->scratch, round, &least, &dropped);
+        if (status != TXM_OK) return status;
+    }
+    if ((double)vertices >= least) return TXM_OK;
+    job->wanted = (uint64_t)least;
+    return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
+                            "# vertices are too few for the pieces of the surface, their creases and "
+                            "borders", vertices, 0);
+}
 
 /* Mend the surface, find its lines. */
 static txm_status tmr_job_mend(trimesh_job *job) {
@@ -6597,7 +7531,6 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     txm_status status =
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
     if (status != TXM_OK) return status;
-    if (tmr_check_least(job, &job->env) != TXM_OK) return TXM_TOO_SMALL;
     tmr_normalize_scale(&job->s);
     if (job->desc.adapt > 0)
         status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
@@ -6605,9 +7538,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     if (status == TXM_OK && !job->plain)
         status = tmr_make_ridges(&job->s, angle, tmr_job_spacing(job), &job->env, &job->input,
                                  &job->scratch);
-    if (status == TXM_OK)
-        status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job), &job->input,
-                                 &job->scratch, &job->report, &job->l);
+    if (status == TXM_OK) status = tmr_job_lines(job, angle);
     if (status != TXM_OK) return status;
     job->w.s = &job->s;
     job->w.l = &job->l;
@@ -6633,7 +7564,12 @@ static txm_status tmr_job_sample(trimesh_job *job) {
     const txm_status status = tmr_copy_surface(&job->w, room, &job->first);
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_JOIN;
-    return tmr_sample(&job->t, &job->w, &job->desc, &job->scratch);
+    const txm_status sampled = tmr_sample(&job->t, &job->w, &job->desc, &job->scratch);
+    if (sampled != TXM_TOO_SMALL) return sampled;
+    txm_arena_free(&job->first); /* no room for lines: the lattice adapts them */
+    memset(&job->w.m, 0, sizeof job->w.m);
+    job->stage = TMR_STAGE_LATTICE;
+    return TXM_OK;
 }
 
 /* Join the points; then copy the mesh without the slots of the surface's own vertices. */
@@ -6694,17 +7630,22 @@ static txm_status tmr_job_subdivide(trimesh_job *job) {
     return TXM_OK;
 }
 
-/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. */
-static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
+/* Does the surface cross itself? Then the result may, too. what: as tmr_count_crossings has it. */
+static txm_status tmr_surface_crosses(trimesh_job *job, int what, int *crosses) {
+    uint8_t *known = &job->crosses[what == TMR_ANY_TOUCHING];
     tmr_work w = job->w;
     txm_arena arena;
     long found = 0;
+    *crosses = *known == 2;
+    if (*known) return TXM_OK;
     txm_arena_init(&arena, &job->env);
     txm_status status = tmr_copy_surface(&w, 0, &arena);
-    if (status == TXM_OK) status = tmr_count_crossings(&w, NULL, rim, &arena, &found);
+    if (status == TXM_OK) status = tmr_count_crossings(&w, NULL, what, &arena, &found);
     txm_arena_free(&arena);
+    if (status != TXM_OK) return status;
     *crosses = found > 0;
-    return status;
+    *known = (uint8_t)(1 + *crosses);
+    return TXM_OK;
 }
 
 /* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
@@ -6712,7 +7653,7 @@ static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
 static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     const int coarse = job->w.line_scale > 1;
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
-    *retries = coarse || quartered || job->retries < 2;
+    *retries = !job->is_trial && (coarse || quartered || job->retries < 2);
     if (!*retries) return TXM_OK;
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
@@ -6743,6 +7684,7 @@ static txm_status tmr_job_without_ridges(trimesh_job *job) {
     memset(&job->w, 0, sizeof job->w);
     job->plain = 1;
     job->cut = job->retries = 0;
+    job->crosses[0] = job->crosses[1] = 0;
     job->stage = TMR_STAGE_MEND;
     return TXM_OK;
 }
@@ -6759,20 +7701,20 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         job->stage = TMR_STAGE_DONE;
         status = tmr_mend_spots(&job->w, &faults);
         if (status != TXM_OK || faults == 0) return status;
-        status = tmr_surface_crosses(job, 0, &crosses);
+        status = tmr_surface_crosses(job, TMR_ANY_CROSSING, &crosses);
         if (status != TXM_OK || crosses) return status;
     }
     status = tmr_job_retry(job, &again);
     if (status != TXM_OK || again) return status;
-    if (exact) { /* as the last resort: sheets that touch edge to edge may be meant to cross */
-        status = tmr_surface_crosses(job, 1, &crosses);
+    if (exact) { /* as the last resort: sheets that touch may be meant to cross */
+        status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);
         if (status != TXM_OK || crosses) return status;
     }
     if (job->s.section) return tmr_job_without_ridges(job);
+    job->wanted = 2 * (uint64_t)job->desc.vertices;
     return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
                             "the surface has parts too thin or too fine for # vertices without "
-                            "crossings; give about #",
-                            job->desc.vertices, 2 * (uint64_t)job->desc.vertices);
+                            "crossings", job->desc.vertices, 0);
 }
 
 static const char *tmr_stage_name(int stage) {
@@ -6786,6 +7728,45 @@ static float tmr_job_fraction(const trimesh_job *job) {
     static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
     const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
     return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
+}
+
+static txm_status tmr_begin(const trimesh_desc *desc, txm_env *env, int is_trial,
+                            trimesh_job **job);
+
+/* Would so many vertices be enough? */
+static txm_status tmr_job_try(const trimesh_job *job, size_t vertices) {
+    trimesh_desc desc = job->desc;
+    txm_env env = job->env; /* whose message stays */
+    trimesh_job *trial = NULL;
+    int more = 1;
+    desc.vertices = vertices;
+    desc.report = NULL;
+    txm_status status = tmr_begin(&desc, &env, 1, &trial);
+    while (status == TXM_OK && more) status = trimesh_step(trial, &env, &more);
+    trimesh_free(trial);
+    return status;
+}
+
+/* After TXM_TOO_SMALL: say how many vertices are enough, which was tried before it is said. */
+static txm_status tmr_job_hint(trimesh_job *job) {
+    static const double part[] = {1, 1.5, 2, 4}; /* ours: of job->wanted */
+    char text[sizeof job->env.message];
+    size_t tried = 0;
+    memcpy(text, job->env.message, sizeof text);
+    for (int k = 0; k < 4; k++) {
+        const double vertices = ceil(part[k] * (double)job->wanted);
+        if (vertices > TRIMESH_MAX_VERTICES || vertices > TMR_MOST) break;
+        tried = (size_t)vertices;
+        const txm_status status = tmr_job_try(job, tried);
+        if (status == TXM_OUT_OF_MEMORY || status == TXM_CANCELLED) return status;
+        if (status == TXM_OK) {
+            snprintf(job->env.message, sizeof text, "%.110s; give %lu", text, (unsigned long)tried);
+            return TXM_TOO_SMALL;
+        }
+    }
+    snprintf(job->env.message, sizeof text, "%.100s; %lu are too few, too", text,
+             (unsigned long)tried);
+    return TXM_TOO_SMALL;
 }
 
 /* One stage or round. A job that has failed stays failed. */
@@ -6803,6 +7784,7 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
+    if (status == TXM_TOO_SMALL && !job->is_trial && job->wanted) status = tmr_job_hint(job);
     if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its marks lie there */
     job->shown = stage;
     job->status = status;
@@ -6904,7 +7886,8 @@ static txm_status tmr_job_leave(const trimesh_job *job, txm_env *env, txm_status
     return status == TXM_OK ? TXM_OK : txm_fail(env, status, job->env.message);
 }
 
-TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job) {
+static txm_status tmr_begin(const trimesh_desc *desc, txm_env *env, int is_trial,
+                            trimesh_job **job) {
     if (desc && desc->report) memset(desc->report, 0, sizeof *desc->report);
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     *job = NULL;
@@ -6916,6 +7899,7 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, tri
     if (env) j->env = *env;
     tmr_job_enter(j, env);
     j->desc = *desc;
+    j->is_trial = is_trial;
     txm_arena_init(&j->input, env);
     txm_arena_init(&j->first, env);
     txm_arena_init(&j->second, env);
@@ -6927,6 +7911,10 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, tri
     if (status != TXM_OK) trimesh_free(j);
     else *job = j;
     return status;
+}
+
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job) {
+    return tmr_begin(desc, env, 0, job);
 }
 
 TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more) {
@@ -7584,15 +8572,20 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     txm_env *env = u->w.env;
     const float angle = u->desc.crease_angle > 0 ? u->desc.crease_angle : TMR_CREASE_ANGLE;
     trimesh_desc desc = u->desc;
+    double least = 0; /* not checked: the old mesh says how many there are */
     if (desc.vertices == 0) desc.vertices = u->old->vertex_count;
     txm_status status = tmr_surface_build(&desc, env, &u->input, report, &u->s);
     if (status != TXM_OK) return status;
     const double length = u->old->edge_length / u->s.diagonal;
     if (u->desc.adapt > 0)
         status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
-    if (status == TXM_OK)
-        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch, report,
-                                 &u->l);
+    for (int round = 0, dropped = 1; dropped && round < 2 && status == TXM_OK; round++) {
+        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch,
+                                 report, &u->l);
+        if (status == TXM_OK)
+            status = tmr_settle_pieces(&u->s, &u->l, &desc, (double)desc.vertices, report,
+                                       &u->scratch, round, &least, &dropped);
+    }
     if (status != TXM_OK) return status;
     u->w.desc = &u->desc;
     u->w.s = &u->s;

@@ -142,14 +142,20 @@ typedef struct trimesh_report {
     size_t degenerate;          /* triangles without area, removed or flipped                */
     size_t duplicate;           /* triangles with the vertices of another                    */
     size_t fins;                /* triangles that stuck out of an edge of two others         */
+    size_t overfull;            /* edges of more than two triangles, which were joined in pairs */
+    size_t opened;              /* triangles left over at such edges, where they have a border */
     size_t turned;              /* triangles reversed to agree with their neighbours         */
+    size_t cut;                 /* edges cut because the surface was one-sided (Moebius)     */
+    size_t closed;              /* of the welded: vertices on borders that were only close   */
+    size_t stitched;            /* vertices put into sides of triangles on which they lay    */
     size_t split;               /* vertices added where fans met in one vertex               */
+    size_t dropped;             /* pieces dropped: below drop_below, or crumbs               */
+    double dropped_area;        /* and their part of the area, 0..1                          */
     size_t components;          /* connected pieces                                          */
     size_t loops;               /* border loops                                              */
     long euler;                 /* vertices - edges + triangles after the repair             */
     size_t crease_edges;        /* edges kept as creases                                     */
     size_t seam_edges;          /* edges kept as seams, some of which may be creases, too    */
-    uint32_t bad_edge[2];       /* out, after TXM_BAD_DATA: the edge that is not repairable  */
 } trimesh_report;
 
 /* ---- retiling ---------------------------------------------------------------------------- */
@@ -177,7 +183,15 @@ typedef struct trimesh_desc {
                               0.25..4; 0 = 1. Increased where lines would take more than half of
                               the vertices                                                      */
     float weld;            /* weld vertices closer than this, relative to the diagonal of the
-                              bounding box, 0..0.01; 0 = only those in the same place           */
+                              bounding box, at most 0.01. 0 = those in the same place, and on
+                              borders those closer than 1e-5 and a tenth of the edges there.
+                              Vertices as close to a border edge are put into it, which closes
+                              T-junctions. -1 = none of this, also in the same place            */
+    float drop_below;      /* drop connected pieces of less than this part of the area, 0..1, except
+                              the largest. Without it, too, crumbs are dropped: pieces that are
+                              worth less than four vertices, if they took more than 5 percent of
+                              the vertices beyond their share and are less than 10 percent of
+                              the area                                                          */
     int iterations;        /* TRIMESH_REPEL: maximum rounds of repulsion, 1..1000; 0 = 40       */
     uint64_t seed;         /* another seed gives another result                                 */
     const uint32_t *seams; /* 3 per triangle, one for each corner, any numbers, such as the indices
@@ -196,9 +210,8 @@ typedef struct trimesh_desc {
    desc    see there
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free
    return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, an index that is not below
-           vertex_count, a position that is not finite; TXM_BAD_DATA for a surface that cannot be
-           repaired (message and report name the first bad edge); TXM_TOO_SMALL if the surface cannot
-           be covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
+           vertex_count, a position that is not finite; TXM_TOO_SMALL if the surface cannot be
+           covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
            TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                      */
 TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh);
 
@@ -306,12 +319,17 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/config.h"
 #include "trimesh_relax/surface.h"
 #include "trimesh_relax/mend.h"
+#include "trimesh_relax/mend_pairs.h"
+#include "trimesh_relax/mend_turn.h"
+#include "trimesh_relax/mend_gaps.h"
 #include "trimesh_relax/mend_thin.h"
+#include "trimesh_relax/mend_doubles.h"
 #include "trimesh_relax/mend_all.h"
 #include "trimesh_relax/seams.h"
 #include "trimesh_relax/bands.h"
 #include "trimesh_relax/creases.h"
 #include "trimesh_relax/density.h"
+#include "trimesh_relax/pieces.h"
 #include "trimesh_relax/mesh.h"
 #include "trimesh_relax/place.h"
 #include "trimesh_relax/work.h"

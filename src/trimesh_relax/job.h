@@ -4,6 +4,7 @@
 #include "mend_all.h"
 #include "density.h"
 #include "ridges.h"
+#include "pieces.h"
 #include "repel.h"
 #include "retile.h"
 
@@ -35,6 +36,9 @@ struct trimesh_job {
     int plain;             /* strips are left as they are: ridges.h                              */
     int retries;           /* with adapted density so far                                       */
     float *plain_scale;    /* scale before the retries                                          */
+    uint64_t wanted;       /* after TXM_TOO_SMALL: how many vertices may do                     */
+    uint8_t crosses[2];    /* the surface crosses, or touches itself: 0 = not known, 1 = no, 2 = yes */
+    int is_trial;          /* to find out whether so many vertices do: one attempt, no hint      */
     int cut; /* how often the number is quartered, then triangles cut in four          */
     tmr_surface s;
     tmr_lines l;
@@ -63,6 +67,8 @@ static txm_status tmr_check_desc(const trimesh_desc *desc, txm_env *env) {
     if (!(desc->line_spacing >= 0.25f && desc->line_spacing <= 4) &&
         !(desc->line_spacing >= 0 && desc->line_spacing <= 0))
         return txm_fail(env, TXM_BAD_ARGUMENT, "line_spacing must be 0.25 to 4, or 0");
+    if (!(desc->drop_below >= 0 && desc->drop_below <= 1))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "drop_below must be 0 to 1");
     if (desc->iterations < 0 || desc->iterations > 1000)
         return txm_fail(env, TXM_BAD_ARGUMENT, "iterations must be 0 to 1000");
     return TXM_OK;
@@ -73,21 +79,27 @@ static double tmr_job_spacing(const trimesh_job *job) {
     return tmr_spacing(&job->s, (double)job->desc.vertices);
 }
 
-/* Are the vertices fewer than any such surface needs? A closed piece needs 4, one with handles as
-   many as Heawood's bound says, an open one 3. */
-static txm_status tmr_check_least(const trimesh_job *job, txm_env *env) {
-    const trimesh_report *r = &job->report;
-    char text[160];
-    double least = 3.0 * (double)r->components + (r->loops == 0 ? (double)r->components : 0);
-    if (r->components == 1 && r->loops == 0 && r->euler < 2)
-        least = ceil((7 + sqrt(49 - 24.0 * (double)r->euler)) / 2);
-    if ((double)job->desc.vertices >= least) return TXM_OK;
-    snprintf(text, sizeof text, "%ld vertices are too few for %ld pieces of Euler characteristic %ld;"
-             " give %.0f or more", (long)job->desc.vertices, (long)r->components, r->euler, least);
-    return txm_fail(env, TXM_TOO_SMALL, text);
-}
-
 /* ---- the stages: each sets the next one ----------------------------------------------------- */
+
+/* Find the lines; drop pieces, and then find them again. */
+static txm_status tmr_job_lines(trimesh_job *job, float angle) {
+    const size_t vertices = job->desc.vertices;
+    double least = 0;
+    int dropped = 1;
+    for (int round = 0; dropped && round < 2; round++) {
+        txm_status status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job),
+                                            &job->input, &job->scratch, &job->report, &job->l);
+        if (status == TXM_OK)
+            status = tmr_settle_pieces(&job->s, &job->l, &job->desc, (double)vertices,
+                                       &job->report, &job->scratch, round, &least, &dropped);
+        if (status != TXM_OK) return status;
+    }
+    if ((double)vertices >= least) return TXM_OK;
+    job->wanted = (uint64_t)least;
+    return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
+                            "# vertices are too few for the pieces of the surface, their creases and "
+                            "borders", vertices, 0);
+}
 
 /* Mend the surface, find its lines. */
 static txm_status tmr_job_mend(trimesh_job *job) {
@@ -95,7 +107,6 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     txm_status status =
         tmr_surface_build(&job->desc, &job->env, &job->input, &job->report, &job->s);
     if (status != TXM_OK) return status;
-    if (tmr_check_least(job, &job->env) != TXM_OK) return TXM_TOO_SMALL;
     tmr_normalize_scale(&job->s);
     if (job->desc.adapt > 0)
         status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), job->desc.adapt, &job->input,
@@ -103,9 +114,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
     if (status == TXM_OK && !job->plain)
         status = tmr_make_ridges(&job->s, angle, tmr_job_spacing(job), &job->env, &job->input,
                                  &job->scratch);
-    if (status == TXM_OK)
-        status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job), &job->input,
-                                 &job->scratch, &job->report, &job->l);
+    if (status == TXM_OK) status = tmr_job_lines(job, angle);
     if (status != TXM_OK) return status;
     job->w.s = &job->s;
     job->w.l = &job->l;
@@ -131,7 +140,12 @@ static txm_status tmr_job_sample(trimesh_job *job) {
     const txm_status status = tmr_copy_surface(&job->w, room, &job->first);
     if (status != TXM_OK) return status;
     job->stage = TMR_STAGE_JOIN;
-    return tmr_sample(&job->t, &job->w, &job->desc, &job->scratch);
+    const txm_status sampled = tmr_sample(&job->t, &job->w, &job->desc, &job->scratch);
+    if (sampled != TXM_TOO_SMALL) return sampled;
+    txm_arena_free(&job->first); /* no room for lines: the lattice adapts them */
+    memset(&job->w.m, 0, sizeof job->w.m);
+    job->stage = TMR_STAGE_LATTICE;
+    return TXM_OK;
 }
 
 /* Join the points; then copy the mesh without the slots of the surface's own vertices. */
@@ -192,17 +206,22 @@ static txm_status tmr_job_subdivide(trimesh_job *job) {
     return TXM_OK;
 }
 
-/* Does the surface cross itself? Then the result may, too. rim: as tmr_faces_cross has it. */
-static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
+/* Does the surface cross itself? Then the result may, too. what: as tmr_count_crossings has it. */
+static txm_status tmr_surface_crosses(trimesh_job *job, int what, int *crosses) {
+    uint8_t *known = &job->crosses[what == TMR_ANY_TOUCHING];
     tmr_work w = job->w;
     txm_arena arena;
     long found = 0;
+    *crosses = *known == 2;
+    if (*known) return TXM_OK;
     txm_arena_init(&arena, &job->env);
     txm_status status = tmr_copy_surface(&w, 0, &arena);
-    if (status == TXM_OK) status = tmr_count_crossings(&w, NULL, rim, &arena, &found);
+    if (status == TXM_OK) status = tmr_count_crossings(&w, NULL, what, &arena, &found);
     txm_arena_free(&arena);
+    if (status != TXM_OK) return status;
     *crosses = found > 0;
-    return status;
+    *known = (uint8_t)(1 + *crosses);
+    return TXM_OK;
 }
 
 /* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
@@ -210,7 +229,7 @@ static txm_status tmr_surface_crosses(trimesh_job *job, int rim, int *crosses) {
 static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
     const int coarse = job->w.line_scale > 1;
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
-    *retries = coarse || quartered || job->retries < 2;
+    *retries = !job->is_trial && (coarse || quartered || job->retries < 2);
     if (!*retries) return TXM_OK;
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
@@ -241,6 +260,7 @@ static txm_status tmr_job_without_ridges(trimesh_job *job) {
     memset(&job->w, 0, sizeof job->w);
     job->plain = 1;
     job->cut = job->retries = 0;
+    job->crosses[0] = job->crosses[1] = 0;
     job->stage = TMR_STAGE_MEND;
     return TXM_OK;
 }
@@ -257,20 +277,20 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         job->stage = TMR_STAGE_DONE;
         status = tmr_mend_spots(&job->w, &faults);
         if (status != TXM_OK || faults == 0) return status;
-        status = tmr_surface_crosses(job, 0, &crosses);
+        status = tmr_surface_crosses(job, TMR_ANY_CROSSING, &crosses);
         if (status != TXM_OK || crosses) return status;
     }
     status = tmr_job_retry(job, &again);
     if (status != TXM_OK || again) return status;
-    if (exact) { /* as the last resort: sheets that touch edge to edge may be meant to cross */
-        status = tmr_surface_crosses(job, 1, &crosses);
+    if (exact) { /* as the last resort: sheets that touch may be meant to cross */
+        status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);
         if (status != TXM_OK || crosses) return status;
     }
     if (job->s.section) return tmr_job_without_ridges(job);
+    job->wanted = 2 * (uint64_t)job->desc.vertices;
     return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
                             "the surface has parts too thin or too fine for # vertices without "
-                            "crossings; give about #",
-                            job->desc.vertices, 2 * (uint64_t)job->desc.vertices);
+                            "crossings", job->desc.vertices, 0);
 }
 
 static const char *tmr_stage_name(int stage) {
@@ -284,6 +304,45 @@ static float tmr_job_fraction(const trimesh_job *job) {
     static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
     const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
     return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
+}
+
+static txm_status tmr_begin(const trimesh_desc *desc, txm_env *env, int is_trial,
+                            trimesh_job **job);
+
+/* Would so many vertices be enough? */
+static txm_status tmr_job_try(const trimesh_job *job, size_t vertices) {
+    trimesh_desc desc = job->desc;
+    txm_env env = job->env; /* whose message stays */
+    trimesh_job *trial = NULL;
+    int more = 1;
+    desc.vertices = vertices;
+    desc.report = NULL;
+    txm_status status = tmr_begin(&desc, &env, 1, &trial);
+    while (status == TXM_OK && more) status = trimesh_step(trial, &env, &more);
+    trimesh_free(trial);
+    return status;
+}
+
+/* After TXM_TOO_SMALL: say how many vertices are enough, which was tried before it is said. */
+static txm_status tmr_job_hint(trimesh_job *job) {
+    static const double part[] = {1, 1.5, 2, 4}; /* ours: of job->wanted */
+    char text[sizeof job->env.message];
+    size_t tried = 0;
+    memcpy(text, job->env.message, sizeof text);
+    for (int k = 0; k < 4; k++) {
+        const double vertices = ceil(part[k] * (double)job->wanted);
+        if (vertices > TRIMESH_MAX_VERTICES || vertices > TMR_MOST) break;
+        tried = (size_t)vertices;
+        const txm_status status = tmr_job_try(job, tried);
+        if (status == TXM_OUT_OF_MEMORY || status == TXM_CANCELLED) return status;
+        if (status == TXM_OK) {
+            snprintf(job->env.message, sizeof text, "%.110s; give %lu", text, (unsigned long)tried);
+            return TXM_TOO_SMALL;
+        }
+    }
+    snprintf(job->env.message, sizeof text, "%.100s; %lu are too few, too", text,
+             (unsigned long)tried);
+    return TXM_TOO_SMALL;
 }
 
 /* One stage or round. A job that has failed stays failed. */
@@ -301,6 +360,7 @@ static txm_status tmr_job_advance(trimesh_job *job) {
     else if (stage == TMR_STAGE_LATTICE) status = tmr_job_lattice(job);
     else if (stage == TMR_STAGE_SUBDIVIDE) status = tmr_job_subdivide(job);
     else status = tmr_job_finish(job);
+    if (status == TXM_TOO_SMALL && !job->is_trial && job->wanted) status = tmr_job_hint(job);
     if (job->stage != TMR_STAGE_JOIN) txm_arena_free(&job->scratch); /* its marks lie there */
     job->shown = stage;
     job->status = status;
@@ -402,7 +462,8 @@ static txm_status tmr_job_leave(const trimesh_job *job, txm_env *env, txm_status
     return status == TXM_OK ? TXM_OK : txm_fail(env, status, job->env.message);
 }
 
-TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job) {
+static txm_status tmr_begin(const trimesh_desc *desc, txm_env *env, int is_trial,
+                            trimesh_job **job) {
     if (desc && desc->report) memset(desc->report, 0, sizeof *desc->report);
     if (!job) return txm_fail(env, TXM_BAD_ARGUMENT, "job is NULL");
     *job = NULL;
@@ -414,6 +475,7 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, tri
     if (env) j->env = *env;
     tmr_job_enter(j, env);
     j->desc = *desc;
+    j->is_trial = is_trial;
     txm_arena_init(&j->input, env);
     txm_arena_init(&j->first, env);
     txm_arena_init(&j->second, env);
@@ -425,6 +487,10 @@ TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, tri
     if (status != TXM_OK) trimesh_free(j);
     else *job = j;
     return status;
+}
+
+TRIMESH_API txm_status trimesh_begin(const trimesh_desc *desc, txm_env *env, trimesh_job **job) {
+    return tmr_begin(desc, env, 0, job);
 }
 
 TRIMESH_API txm_status trimesh_step(trimesh_job *job, txm_env *env, int *more) {

@@ -102,7 +102,7 @@ static double tmr_sampling_length(const tmr_surface *s, const tmr_lines *l, doub
 /* How many edges a line is cut into: by its length, and so many that no two edges coincide. */
 static int32_t tmr_line_steps(const tmr_sampling *t, int32_t line) {
     const tmr_lines *l = t->w->l;
-    const double spacing = t->length * (t->desc->line_spacing > 0 ? t->desc->line_spacing : 1);
+    const double spacing = t->length * t->w->line_scale;
     const double steps = floor(tmr_line_weight(t->w->s, l, line) / spacing + 0.5);
     const int32_t a = l->a[l->first[line]], b = l->b[l->first[line + 1] - 1];
     const int32_t least = a == b ? 3 : 1;
@@ -555,25 +555,18 @@ static txm_status tmr_sampling_alloc(tmr_sampling *t, txm_arena *scratch) {
     return TXM_OK;
 }
 
-/* Corners and the points on lines. */
+/* Corners and the points on lines. TXM_TOO_SMALL: there is no room for so many. */
 static txm_status tmr_sample_lines(tmr_sampling *t) {
     const tmr_surface *s = t->w->s;
     const tmr_lines *l = t->w->l;
     const tmr_mesh *m = &t->w->m;
-    uint64_t points = 0;
     for (int32_t v = 0; v < s->vertex_count; v++) t->keep[v] = l->kind[v] == TRIMESH_CORNER;
     for (int32_t i = 0; i < l->line_count; i++) {
         const int32_t steps = tmr_line_steps(t, i), first = l->closed[i] ? 0 : 1;
         const double step = tmr_line_weight(s, l, i) / steps;
         for (int32_t k = first; k < steps; k++) t->ways[k - first] = k * step;
-        if (tmr_cut_line(t, i, t->ways, steps - first, NULL) != TXM_OK) {
-            for (; i < l->line_count; i++) points += (uint64_t)tmr_line_steps(t, i);
-            return txm_fail_numbers(t->w->env, TXM_TOO_SMALL,
-                                    "# vertices are too few for creases and borders alone; give "
-                                    "about #, or a larger line_spacing",
-                                    t->desc->vertices, points);
-        }
-        points += (uint64_t)steps;
+        const txm_status status = tmr_cut_line(t, i, t->ways, steps - first, NULL);
+        if (status != TXM_OK) return status;
     }
     for (int32_t v = 0; v < m->vertex_count; v++)
         if (t->keep[v]) t->fixed[s->component[tmr_face_of(t->w, v)]]++;
@@ -589,7 +582,7 @@ static txm_status tmr_sample(tmr_sampling *t, tmr_work *w, const trimesh_desc *d
     t->w = w;
     t->desc = desc;
     t->length = w->length =
-        tmr_sampling_length(w->s, w->l, desc->line_spacing > 0 ? desc->line_spacing : 1, total);
+        tmr_sampling_length(w->s, w->l, w->line_scale, total);
     txm_status status = tmr_sampling_alloc(t, scratch);
     if (status != TXM_OK) return status;
     tmr_least_points(t);

@@ -36,6 +36,7 @@ typedef struct tmr_mend {
     int single;        /* non-zero: some face has no such duplicate                       */
     int32_t *list;     /* 1 per face, of the step at hand                                 */
     uint32_t *sides;   /* 1 per corner: the sides in the order of their edges; as much scratch */
+    txm_arena *arena, *scratch; /* what the surface keeps; what is freed after mending   */
     int32_t *table;    /* hash table: index + 1, 0 = free                                 */
     size_t table_size; /* a power of two, at least twice the vertices and the faces       */
     txm_dvec3 centre;
@@ -46,24 +47,6 @@ typedef struct tmr_mend {
 static txm_status tmr_mend_cancel(tmr_mend *m, float fraction) {
     if (!txm_progress(m->env, fraction, "mend")) return TXM_OK;
     return txm_fail(m->env, TXM_CANCELLED, "cancelled while mending the surface");
-}
-
-static txm_status tmr_mend_fail_edge(tmr_mend *m, int32_t corner, int count) {
-    const int32_t a = m->vertex[tmr_next(corner)], b = m->vertex[tmr_prev(corner)];
-    char line[160];
-    m->report.bad_edge[0] = (uint32_t)(a < b ? a : b);
-    m->report.bad_edge[1] = (uint32_t)(a < b ? b : a);
-    if (count > 2)
-        snprintf(line, sizeof line,
-                 "edge between vertex %ld and %ld (of the input, from 0) has %d triangles; "
-                 "make the surface a manifold: at most two at an edge",
-                 (long)m->report.bad_edge[0], (long)m->report.bad_edge[1], count);
-    else
-        snprintf(line, sizeof line,
-                 "edge between vertex %ld and %ld (of the input, from 0) closes a one-sided "
-                 "band; cut the surface so that it has two sides",
-                 (long)m->report.bad_edge[0], (long)m->report.bad_edge[1]);
-    return txm_fail(m->env, TXM_BAD_DATA, line);
 }
 
 static txm_status tmr_check_scale(const trimesh_desc *desc, txm_env *env) {
@@ -91,31 +74,39 @@ static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (status != TXM_OK) return status;
     if (desc->surface.vertex_count == 0 || desc->surface.face_count == 0)
         return txm_fail(env, TXM_TOO_SMALL, "surface: no vertices or no triangles");
-    if (!(desc->weld >= 0 && desc->weld <= 0.01f))
-        return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01");
+    if (!(desc->weld >= -1 && desc->weld <= 0.01f))
+        return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01, or -1 for none");
     return desc->scale ? tmr_check_scale(desc, env) : TXM_OK;
 }
 
-/* Allocate all that the mending needs: what the surface keeps from arena, the rest from scratch. */
-static txm_status tmr_mend_alloc(tmr_mend *m, txm_arena *arena, txm_arena *scratch) {
-    const size_t v = (size_t)m->vertex_count, f = (size_t)m->face_count;
+/* Allocate what there is for each face and corner, with room for so many faces, and the table. What
+   the surface keeps lies in m->arena, the rest in m->scratch. */
+static txm_status tmr_mend_alloc_faces(tmr_mend *m, size_t faces) {
+    const size_t v = (size_t)m->vertex_count;
     m->table_size = 16;
-    while (m->table_size < 2 * (v > f ? v : f)) m->table_size *= 2;
-    m->vertex = (int32_t *)txm_arena_alloc(arena, 3 * f, sizeof(int32_t));
-    m->opposite = (int32_t *)txm_arena_alloc(arena, 3 * f, sizeof(int32_t));
-    m->origin = (uint32_t *)txm_arena_alloc(arena, f, sizeof(uint32_t));
-    m->turn = (uint8_t *)txm_arena_zero(arena, f, 1);
-    m->rename = (int32_t *)txm_arena_alloc(scratch, 3 * v, sizeof(int32_t));
-    m->flag = (uint8_t *)txm_arena_zero(scratch, 2 * f, 1);
-    m->list = (int32_t *)txm_arena_alloc(scratch, f, sizeof(int32_t));
-    m->sides = (uint32_t *)txm_arena_alloc(scratch, 6 * f, sizeof(uint32_t));
-    m->table = (int32_t *)txm_arena_alloc(scratch, m->table_size, sizeof(int32_t));
-    if (arena->failed || scratch->failed)
+    while (m->table_size < 2 * (v > faces ? v : faces)) m->table_size *= 2;
+    m->vertex = (int32_t *)txm_arena_alloc(m->arena, 3 * faces, sizeof(int32_t));
+    m->opposite = (int32_t *)txm_arena_alloc(m->arena, 3 * faces, sizeof(int32_t));
+    m->origin = (uint32_t *)txm_arena_alloc(m->arena, faces, sizeof(uint32_t));
+    m->turn = (uint8_t *)txm_arena_zero(m->arena, faces, 1);
+    m->flag = (uint8_t *)txm_arena_zero(m->scratch, 2 * faces, 1);
+    m->list = (int32_t *)txm_arena_alloc(m->scratch, faces, sizeof(int32_t));
+    m->sides = (uint32_t *)txm_arena_alloc(m->scratch, 6 * faces, sizeof(uint32_t));
+    m->table = (int32_t *)txm_arena_alloc(m->scratch, m->table_size, sizeof(int32_t));
+    if (m->arena->failed || m->scratch->failed)
         return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
+    m->twin = m->flag + faces;
+    return TXM_OK;
+}
+
+/* Allocate all that the mending needs. */
+static txm_status tmr_mend_alloc(tmr_mend *m) {
+    const size_t v = (size_t)m->vertex_count;
+    m->rename = (int32_t *)txm_arena_alloc(m->scratch, 3 * v, sizeof(int32_t));
+    if (!m->rename) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
     m->degree = m->rename + v;
     m->stamp = m->degree + v;
-    m->twin = m->flag + f;
-    return TXM_OK;
+    return tmr_mend_alloc_faces(m, (size_t)m->face_count);
 }
 
 /* ---- mending: vertices -------------------------------------------------------------------- */
@@ -166,13 +157,15 @@ static txm_dvec3 tmr_cell(txm_dvec3 p, double size) {
     return size > 0 ? txm_d3(floor(p.x / size), floor(p.y / size), floor(p.z / size)) : p;
 }
 
-/* The lowest vertex in a cell that is not farther than size from point i, or else best. */
+/* The lowest vertex in a cell that is not farther than size from point i, or else best. reach: NULL,
+   or 1 per vertex: not farther than this of both, either. */
 static int32_t tmr_weld_find(const tmr_mend *m, txm_dvec3 cell, int32_t i, double size,
-                             int32_t best) {
+                             const double *reach, int32_t best) {
     size_t slot = (size_t)tmr_hash_cell(cell) & (m->table_size - 1);
     for (; m->table[slot]; slot = (slot + 1) & (m->table_size - 1)) {
         const int32_t j = m->table[slot] - 1;
-        if ((best < 0 || j < best) && txm_d3_dist2(m->point[i], m->point[j]) <= size * size)
+        const double most = reach ? fmin(size, fmin(reach[i], reach[j])) : size;
+        if ((best < 0 || j < best) && txm_d3_dist2(m->point[i], m->point[j]) <= most * most)
             best = j;
     }
     return best;
@@ -180,20 +173,21 @@ static int32_t tmr_weld_find(const tmr_mend *m, txm_dvec3 cell, int32_t i, doubl
 
 /* Each vertex, in order, is welded to the first kept vertex that is near enough, or else is kept.
    So chains of near vertices do not collapse into one, and a cell of the grid holds few kept
-   vertices. With size 0 only vertices in equal places are welded. */
-static void tmr_weld(tmr_mend *m) {
-    double size = m->desc->weld;
+   vertices. With size 0 only vertices in equal places are welded. reach: as tmr_weld_find has it;
+   vertices for which it is negative are left out. */
+static void tmr_weld(tmr_mend *m, double size, const double *reach) {
     if (size < 1e-14) size = 0; /* so that a cell's number plus 1 is another number */
-    const int reach = size > 0 ? 1 : 0;
+    const int range = size > 0 ? 1 : 0;
     memset(m->table, 0, m->table_size * sizeof *m->table);
     for (int32_t i = 0; i < m->vertex_count; i++) {
-        if (m->rename[i] < 0) continue;
+        if (m->rename[i] != i || (reach && reach[i] < 0)) continue;
         const txm_dvec3 cell = tmr_cell(m->point[i], size);
         int32_t best = -1;
-        for (int x = -reach; x <= reach; x++) {
-            for (int y = -reach; y <= reach; y++) {
-                for (int z = -reach; z <= reach; z++)
-                    best = tmr_weld_find(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, best);
+        for (int x = -range; x <= range; x++) {
+            for (int y = -range; y <= range; y++) {
+                for (int z = -range; z <= range; z++)
+                    best = tmr_weld_find(m, txm_d3_add(cell, txm_d3(x, y, z)), i, size, reach,
+                                         best);
             }
         }
         if (best >= 0) {
@@ -379,72 +373,16 @@ static int tmr_cut_twins(tmr_mend *m, int32_t begin, int32_t end) {
     return 1;
 }
 
-/* Two sheets that touch along an edge, seen along it, angles rising clockwise: four faces around
-   it, with alternating winding. Faces with the inside between them belong together:
-
-            \  solid /           e is the edge from its lower vertex to the higher. The normal of a
-         -   \      /  +         face that winds along e (+) points to rising angles, so the solid
-              \    /             lies between it and the one before it, which must wind against
-               \  /              e (-).
-         +_____ e _____-
-               solid                                                                            */
-static int tmr_pair_sheets(tmr_mend *m, int32_t begin, int32_t end) {
-    enum { MOST = 16 };
-    const txm_mesh mesh = tmr_mend_mesh(m);
-    const int32_t count = end - begin, low = (int32_t)txm_mesh_low(&mesh, m->sides[begin]);
-    const int32_t high = (int32_t)txm_mesh_high(&mesh, m->sides[begin]);
-    const txm_dvec3 e = txm_d3_unit(txm_d3_sub(m->point[high], m->point[low]));
-    txm_dvec3 u = e, w = e;
-    double angle[MOST];
-    int32_t corner[MOST];
-    if (count > MOST || count % 2) return 0;
-    for (int32_t k = 0; k < count; k++) {
-        const int32_t c = tmr_opposite_corner(m, begin + k);
-        txm_dvec3 d = txm_d3_sub(m->point[m->vertex[c]], m->point[low]);
-        d = txm_d3_mad(d, e, -txm_d3_dot(d, e));
-        if (tmr_face_is_thin(m, c / 3)) return 0;
-        if (k == 0) {
-            u = txm_d3_unit(d);
-            w = txm_d3_cross(e, u);
-        }
-        const double a = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
-        int32_t at = k;
-        for (; at > 0 && angle[at - 1] > a; at--) {
-            angle[at] = angle[at - 1];
-            corner[at] = corner[at - 1];
-        }
-        angle[at] = a;
-        corner[at] = c;
-    }
-    for (int32_t k = 0; k < count; k++) { /* clearly apart, and alternating? */
-        const int32_t next = (k + 1) % count;
-        const double gap = angle[next] - angle[k] + (next ? 0 : 2 * TXM_PI);
-        const int along = m->vertex[tmr_next(corner[k])] == low;
-        if (gap < 1e-4 || along == (m->vertex[tmr_next(corner[next])] == low)) return 0;
-    }
-    for (int32_t k = 0; k < count; k++) {
-        const int along = m->vertex[tmr_next(corner[k])] == low;
-        m->opposite[corner[k]] = corner[(k + count + (along ? -1 : 1)) % count];
-    }
-    return 1;
-}
-
 static void tmr_clear_flags(tmr_mend *m) {
     for (int32_t f = 0; f < m->face_count; f++) m->flag[f] = 0;
 }
 
 /* Call `mend` for the edges with more than two faces. Returns how many of them it mended. */
-static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t),
-                                 int32_t *bad, int *bad_count) {
+static int32_t tmr_mend_overfull(tmr_mend *m, int (*mend)(tmr_mend *, int32_t, int32_t)) {
     int32_t mended = 0;
     for (int32_t i = 0, end; i < 3 * m->face_count; i = end) {
         end = tmr_run_end(m, i);
-        if (end - i < 3) continue;
-        if (mend(m, i, end)) mended++;
-        else if (*bad < 0) {
-            *bad = tmr_opposite_corner(m, i);
-            *bad_count = (int)(end - i);
-        }
+        if (end - i > 2) mended += mend(m, i, end);
     }
     return mended;
 }
@@ -458,31 +396,6 @@ static size_t tmr_cut_flagged(tmr_mend *m) {
     }
     tmr_mend_compact(m);
     return count;
-}
-
-/* Find the opposites, mending edges until each has at most two faces. */
-static txm_status tmr_mend_edges(tmr_mend *m) {
-    int32_t bad = -1;
-    int bad_count = 0;
-    for (int round = 0; tmr_mend_opposites(m) > 0; round++) {
-        int32_t ignored = 0; /* not below 0: nothing is written */
-        tmr_clear_flags(m);
-        for (int32_t f = 0; f < m->face_count; f++) m->single |= !m->twin[f];
-        if (round < TMR_MEND_ROUNDS) {
-            if (tmr_mend_overfull(m, tmr_cut_fins, &ignored, &bad_count)) {
-                m->report.fins += tmr_cut_flagged(m);
-                continue;
-            }
-            if (tmr_mend_overfull(m, tmr_cut_twins, &ignored, &bad_count)) {
-                m->report.duplicate += tmr_cut_flagged(m);
-                continue;
-            }
-        }
-        tmr_mend_overfull(m, tmr_pair_sheets, &bad, &bad_count);
-        if (bad >= 0) return tmr_mend_fail_edge(m, bad, bad_count);
-        break;
-    }
-    return TXM_OK;
 }
 
 #endif /* TRIMESH_RELAX_MEND_H */

@@ -1,7 +1,8 @@
 #ifndef TRIMESH_RELAX_MEND_ALL_H
 #define TRIMESH_RELAX_MEND_ALL_H
 
-#include "mend_thin.h"
+#include "mend_gaps.h"
+#include "mend_doubles.h"
 
 /* ---- the surface: normals and topology ---------------------------------------------------- */
 
@@ -144,18 +145,22 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
     if (status != TXM_OK) return status;
     m->vertex_count = (int32_t)m->desc->surface.vertex_count;
     m->face_count = (int32_t)m->desc->surface.face_count;
+    m->arena = arena;
+    m->scratch = scratch;
     m->point = (txm_dvec3 *)txm_arena_alloc(places, (size_t)m->vertex_count, sizeof(txm_dvec3));
     if (!m->point) return txm_fail(m->env, TXM_OUT_OF_MEMORY, "no memory to mend the surface");
-    if ((status = tmr_mend_alloc(m, arena, scratch)) != TXM_OK) return status;
+    if ((status = tmr_mend_alloc(m)) != TXM_OK) return status;
     if ((status = tmr_mend_cancel(m, 0)) != TXM_OK) return status;
     if ((status = tmr_mend_scale(m)) != TXM_OK) return status;
-    tmr_weld(m);
+    if (m->desc->weld >= 0) tmr_weld(m, m->desc->weld, NULL);
     if ((status = tmr_mend_cancel(m, 0.01f)) != TXM_OK) return status;
     tmr_mend_load(m);
+    if ((status = tmr_mend_gaps(m)) != TXM_OK) return status;
     if ((status = tmr_mend_faces(m)) != TXM_OK) return status;
     if ((status = tmr_mend_thin(m)) != TXM_OK) return status;
     if ((status = tmr_mend_cancel(m, 0.03f)) != TXM_OK) return status;
     if ((status = tmr_mend_finish(m, arena, s)) != TXM_OK) return status;
+    if ((status = tmr_split_doubles(m, arena, s)) != TXM_OK) return status;
     txm_arena_free(scratch);
     txm_arena_free(places);
     if ((status = tmr_mend_cancel(m, 0.04f)) != TXM_OK) return status;
@@ -166,7 +171,7 @@ static txm_status tmr_mend_all(tmr_mend *m, txm_arena *arena, txm_arena *places,
 
    arena   receives what the surface keeps, also part of it after an error: free it then
    report  NULL, or receives what was found, also after an error
-   return  TXM_OK; TXM_BAD_ARGUMENT; TXM_BAD_DATA; TXM_TOO_SMALL without area or faces;
+   return  TXM_OK; TXM_BAD_ARGUMENT; TXM_TOO_SMALL without area or faces;
            TXM_TOO_LARGE; TXM_OUT_OF_MEMORY; TXM_CANCELLED
    cost    O(n) time; about 130 bytes per triangle of a closed mesh, 85 of them kept         */
 static txm_status tmr_surface_build(const trimesh_desc *desc, txm_env *env, txm_arena *arena,

@@ -61,9 +61,10 @@ static int32_t tmr_cw(const int32_t *opposite, int32_t c) {
 
    vertices   scale to the unit box, weld, ignore unused ones
    faces      remove those with a vertex twice, and duplicates
+   gaps       weld the borders that nearly meet, put vertices into the sides on which they lie
    edges      find opposites; where an edge has more than two faces remove fins and interior walls,
-              separate sheets that touch, or refuse
-   winding    orient faces consistently, or refuse
+              and pair the others
+   winding    orient faces consistently, and cut where the surface is one-sided
    area       flip caps and collapse needles; start again if faces were added or removed
    fans       one vertex for each, numbered
    measures   normals, components, border loops                                                 */

@@ -598,15 +598,20 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     txm_env *env = u->w.env;
     const float angle = u->desc.crease_angle > 0 ? u->desc.crease_angle : TMR_CREASE_ANGLE;
     trimesh_desc desc = u->desc;
+    double least = 0; /* not checked: the old mesh says how many there are */
     if (desc.vertices == 0) desc.vertices = u->old->vertex_count;
     txm_status status = tmr_surface_build(&desc, env, &u->input, report, &u->s);
     if (status != TXM_OK) return status;
     const double length = u->old->edge_length / u->s.diagonal;
     if (u->desc.adapt > 0)
         status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
-    if (status == TXM_OK)
-        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch, report,
-                                 &u->l);
+    for (int round = 0, dropped = 1; dropped && round < 2 && status == TXM_OK; round++) {
+        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch,
+                                 report, &u->l);
+        if (status == TXM_OK)
+            status = tmr_settle_pieces(&u->s, &u->l, &desc, (double)desc.vertices, report,
+                                       &u->scratch, round, &least, &dropped);
+    }
     if (status != TXM_OK) return status;
     u->w.desc = &u->desc;
     u->w.s = &u->s;

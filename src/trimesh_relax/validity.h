@@ -51,6 +51,63 @@ static int tmr_faces_cross(const tmr_mesh *m, int32_t f, int32_t g, int rim) {
     return 0;
 }
 
+#define TMR_TOUCH 1e-6 /* ours: distance, in diagonals, of what touches */
+
+/* squared distance of the segments a b and c d */
+static double tmr_segments_dist2(txm_dvec3 a, txm_dvec3 b, txm_dvec3 c, txm_dvec3 d) {
+    const txm_dvec3 u = txm_d3_sub(b, a), v = txm_d3_sub(d, c), w = txm_d3_sub(a, c);
+    const double uu = txm_d3_len2(u), vv = txm_d3_len2(v), uv = txm_d3_dot(u, v);
+    const double uw = txm_d3_dot(u, w), vw = txm_d3_dot(v, w), det = uu * vv - uv * uv;
+    double s = det > 1e-12 * uu * vv ? (uv * vw - vv * uw) / det : 0;
+    s = fmin(fmax(s, 0), 1);
+    double t = vv > 0 ? (uv * s + vw) / vv : 0;
+    if (t < 0 || t > 1) { /* beyond an end: that end, and the place on a b nearest to it */
+        t = t < 0 ? 0 : 1;
+        s = uu > 0 ? fmin(fmax((uv * t - uw) / uu, 0), 1) : 0;
+    }
+    return txm_d3_dist2(txm_d3_mad(a, u, s), txm_d3_mad(c, v, t));
+}
+
+static int tmr_point_touches(txm_dvec3 p, const txm_dvec3 t[3]) {
+    double u, v;
+    int part;
+    return txm_d3_dist2(p, tmr_nearest(p, t[0], t[1], t[2], &u, &v, &part)) < TMR_TOUCH * TMR_TOUCH;
+}
+
+/* Do two triangles touch away from the vertices that they share? So do cards and boxes that stand on
+   one another, sheets that lie on each other, and what was separated along an edge. */
+static int tmr_faces_touch(const tmr_mesh *m, int32_t f, int32_t g) {
+    txm_dvec3 p[2][3];
+    int alone[2][3] = {{1, 1, 1}, {1, 1, 1}}; /* not shared */
+    for (int i = 0; i < 3; i++) {
+        p[0][i] = m->p[m->vertex[3 * f + i]];
+        p[1][i] = m->p[m->vertex[3 * g + i]];
+        for (int j = 0; j < 3; j++)
+            if (m->vertex[3 * f + i] == m->vertex[3 * g + j]) alone[0][i] = alone[1][j] = 0;
+    }
+    for (int k = 0; k < 2; k++) { /* a triangle without area touches its neighbours anyway */
+        const double longest = fmax(txm_d3_dist2(p[k][0], p[k][1]),
+                                    fmax(txm_d3_dist2(p[k][1], p[k][2]),
+                                         txm_d3_dist2(p[k][2], p[k][0])));
+        if (txm_d3_len(txm_d3_area2(p[k][0], p[k][1], p[k][2])) <= 10 * TMR_TOUCH * sqrt(longest))
+            return 0;
+    }
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < 3; i++)
+            if (alone[k][i] && tmr_point_touches(p[k][i], p[1 - k])) return 1;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) { /* edges without a shared end */
+            const int i2 = (i + 1) % 3, j2 = (j + 1) % 3;
+            const int32_t a = m->vertex[3 * f + i], b = m->vertex[3 * f + i2];
+            const int32_t c = m->vertex[3 * g + j], d = m->vertex[3 * g + j2];
+            if (a == c || a == d || b == c || b == d) continue;
+            if (tmr_segments_dist2(p[0][i], p[0][i2], p[1][j], p[1][j2]) < TMR_TOUCH * TMR_TOUCH)
+                return 1;
+        }
+    }
+    return 0;
+}
+
 /* Triangles by the cells of a grid that their bounding boxes touch: hashed cells, sorted. */
 typedef struct tmr_cells {
     double cell;
@@ -135,12 +192,24 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *nearby, tmr_c
     return TXM_OK;
 }
 
+/* Is this the cell in which the boxes of two triangles, with these low corners, overlap first? There
+   are others, where the pair need not be looked at again. */
+static int tmr_is_first_cell(const tmr_cells *g, uint32_t key, txm_dvec3 a, txm_dvec3 b) {
+    return key == tmr_cell_key((int32_t)floor(fmax(a.x, b.x) / g->cell),
+                               (int32_t)floor(fmax(a.y, b.y) / g->cell),
+                               (int32_t)floor(fmax(a.z, b.z) / g->cell));
+}
+
+enum { TMR_COUNT_CROSSING, TMR_ANY_CROSSING, TMR_ANY_TOUCHING }; /* what tmr_count_crossings does */
+
 /* Count the pairs of triangles that cross each other in *found, and mark their vertices in w->bad.
-   near: where to look, as tmr_mark_near has it; NULL = everywhere. rim: as tmr_faces_cross has it.
-   Linear in the number of triangles. */
-static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int rim,
+   near: where to look, as tmr_mark_near has it; NULL = everywhere. what: TMR_ANY_CROSSING stops at the
+   first one, TMR_ANY_TOUCHING also at the first that touch. Linear in the number of triangles. */
+static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int what,
                                       txm_arena *scratch, long *found) {
     const tmr_mesh *m = &w->m;
+    const int rim = what == TMR_ANY_TOUCHING;
+    const double slack = rim ? TMR_TOUCH : 0;
     tmr_cells g;
     *found = 0;
     const txm_status status = tmr_cells_make(w, nearby, &g, scratch);
@@ -157,10 +226,16 @@ static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int ri
                 txm_dvec3 low2, high2;
                 if (f == h) continue;
                 tmr_face_box(m, h, &low2, &high2);
-                if (low.x > high2.x || low2.x > high.x || low.y > high2.y || low2.y > high.y ||
-                    low.z > high2.z || low2.z > high.z || !tmr_faces_cross(m, f, h, rim))
+                if (low.x > high2.x + slack || low2.x > high.x + slack ||
+                    low.y > high2.y + slack || low2.y > high.y + slack ||
+                    low.z > high2.z + slack || low2.z > high.z + slack)
                     continue;
+                if (what != TMR_COUNT_CROSSING &&
+                    !tmr_is_first_cell(&g, g.entry[i].key, low, low2))
+                    continue;
+                if (!tmr_faces_cross(m, f, h, rim) && !(rim && tmr_faces_touch(m, f, h))) continue;
                 ++*found;
+                if (what != TMR_COUNT_CROSSING) return TXM_OK;
                 for (int k = 0; k < 3; k++)
                     w->bad[m->vertex[3 * f + k]] = w->bad[m->vertex[3 * h + k]] = 1;
             }
@@ -340,7 +415,8 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
         if (round > 0) tmr_mark_near(w, nearby); /* w->bad: what was moved */
         memset(w->bad, 0, count);
         txm_arena_init(&scratch, w->env);
-        status = tmr_count_crossings(w, round > 0 ? nearby : NULL, 0, &scratch, &crossings);
+        status = tmr_count_crossings(w, round > 0 ? nearby : NULL, TMR_COUNT_CROSSING, &scratch,
+                                     &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
         const long turned = tmr_count_inverted(w, &doubtful);
