@@ -36,7 +36,7 @@
 
    HOW IT WORKS
      The input is repaired (welded, consistently oriented; duplicate and degenerate triangles are
-     removed), creases and borders become lines, each border loop is closed by a ghost vertex.
+     removed, sheets that share an edge are separated, one-sided ones cut, T-junctions stitched), creases and borders become lines, each border loop is closed by a ghost vertex.
      The working mesh starts as a copy of the surface and is a closed manifold at every moment: it is
      only split, collapsed (under the link condition) and flipped, so its topology cannot change.
        TRIMESH_LATTICE (default): the copy is resampled to about twice the number of vertices; a
@@ -69,8 +69,9 @@
 
    LIMITS
      Uniform triangles cannot show detail that is finer than they are: ears thinner than an edge are
-     smoothed; volume_change of the mesh says what that costs. Where that would leave crossings, edges become shorter there, or the call says that it
-     needs more vertices. A surface that crosses itself is accepted; its result may cross itself, too.
+     smoothed; volume_change of the mesh says what that costs. Where that would leave crossings, edges
+     become shorter there, or the call says that it needs more vertices. A surface that crosses or
+     touches itself is accepted; its result may cross itself, too.
      Creases sharper than 120 degrees stay creases, so two triangles nearly face each other there.
      The number of vertices is exact; edge lengths follow from it.
      Positions are floats, which hold some seven digits: from a mesh that lies farther from the origin
@@ -211,7 +212,8 @@ typedef struct trimesh_desc {
    mesh    receives the mesh, or NULL on any error; release it with trimesh_mesh_free
    return  TXM_OK; TXM_BAD_ARGUMENT for a field outside its range, an index that is not below
            vertex_count, a position that is not finite; TXM_TOO_SMALL if the surface cannot be
-           covered with so few vertices (the message says how many are needed); TXM_TOO_LARGE;
+           covered with so few vertices (the message names a number that is enough: up to four
+           were tried for it, which takes as long as the call with them); TXM_TOO_LARGE;
            TXM_OUT_OF_MEMORY; TXM_CANCELLED                                                      */
 TRIMESH_API txm_status trimesh_retile(const trimesh_desc *desc, txm_env *env, trimesh_mesh **mesh);
 
@@ -7755,7 +7757,7 @@ static txm_status tmr_job_hint(trimesh_job *job) {
     memcpy(text, job->env.message, sizeof text);
     for (int k = 0; k < 4; k++) {
         const double vertices = ceil(part[k] * (double)job->wanted);
-        if (vertices > TRIMESH_MAX_VERTICES || vertices > TMR_MOST) break;
+        if (vertices > TRIMESH_MAX_VERTICES || vertices > (double)TMR_MOST) break;
         tried = (size_t)vertices;
         const txm_status status = tmr_job_try(job, tried);
         if (status == TXM_OUT_OF_MEMORY || status == TXM_CANCELLED) return status;

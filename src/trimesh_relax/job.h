@@ -331,7 +331,7 @@ static txm_status tmr_job_hint(trimesh_job *job) {
     memcpy(text, job->env.message, sizeof text);
     for (int k = 0; k < 4; k++) {
         const double vertices = ceil(part[k] * (double)job->wanted);
-        if (vertices > TRIMESH_MAX_VERTICES || vertices > TMR_MOST) break;
+        if (vertices > TRIMESH_MAX_VERTICES || vertices > (double)TMR_MOST) break;
         tried = (size_t)vertices;
         const txm_status status = tmr_job_try(job, tried);
         if (status == TXM_OUT_OF_MEMORY || status == TXM_CANCELLED) return status;

@@ -159,7 +159,7 @@ for to in obj ply stl glb; do
 done
 check "the torus: Euler characteristic 0" run 0 torus.obj -o t.ply --vertices 301 --stats stats.json
 check "and its other figures" figures command=\"retile\" vertices=301 triangles=602 euler=0 \
-    components=1 loops=0 crease_edges=0 "mended=[0, 0, 0, 0, 0, 0, 0]"
+    components=1 loops=0 crease_edges=0 "mended=[0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]"
 for key in seed threads read retile dress measure encode total peak_bytes edge_length quality \
     quality_least valence_6 edge_variation area_variation least_angle file_bytes; do
     check "--stats has $key" grep -q "\"$key\": " stats.json
@@ -256,14 +256,56 @@ done
     >density.pgm
 check "--density" run 0 torus.obj -o density.ply --vertices 400 --density density.pgm
 
+# ---- any surface
+awk 'BEGIN { # a band with a half turn; two boxes with a wall in between; a long side against two short ones
+    for (i = 0; i < 30; i++) {
+        u = i * 0.20943951
+        for (s = -1; s < 2; s += 2) {
+            r = 2 + 0.4 * s * cos(u / 2)
+            printf "v %g %g %g\n", r * cos(u), r * sin(u), 0.4 * s * sin(u / 2) >"moebius.obj"
+        }
+    }
+    for (i = 0; i < 29; i++)
+        printf "f %d %d %d %d\n", 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2 >"moebius.obj"
+    print "f 59 2 1 60" >"moebius.obj"
+    for (i = 0; i < 12; i++) print "v", i % 3, int(i / 3) % 2, int(i / 6) >"wall.obj"
+    print "f 1 4 5 2\nf 2 5 6 3\nf 7 8 11 10\nf 8 9 12 11\nf 1 2 8 7\nf 2 3 9 8" >"wall.obj"
+    print "f 4 10 11 5\nf 5 11 12 6\nf 1 7 10 4\nf 3 6 12 9\nf 2 5 11 8" >"wall.obj"
+    print "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nv 1 0 0\nv 0 -1 0\nv 1 -1 0\nv 2 -1 0" >"long.obj"
+    print "f 1 2 3 4\nf 6 7 5 1\nf 7 8 2 5" >"long.obj"
+    for (i = 0; i < 400; i++) {
+        x = 3 + i % 20 * 0.1; y = int(i / 20) * 0.1
+        printf "v %g %g 0\nv %g %g 0\nv %g %g 0\nf -3 -2 -1\n", x, y, x + 0.001, y, x, y + 0.001 >"crumbs.obj"
+    }
+    print "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nf -4 -3 -2 -1" >"crumbs.obj"
+}'
+check "a Moebius band is cut" warns "edge of a one-sided surface cut" retile moebius.obj -o m.obj --vertices 200
+check "a wall in a box" warns "4 edges of more than two triangles taken apart in pairs" \
+    retile wall.obj -o m.obj --vertices 200
+check "a T-junction" warns "1 T-junction stitched" retile long.obj -o m.obj --vertices 100 --stats stats.json
+check "is closed" figures loops=1 components=1
+check "--weld 0" run 0 long.obj -o m.obj --vertices 100 --weld 0 --stats stats.json
+check "welds nothing" figures components=3
+check "--weld 0.1%" run 0 cube.obj -o m.obj --vertices 100 --weld 0.1%
+check "crumbs" warns "loose pieces dropped" retile crumbs.obj -o m.obj --vertices 500
+check "--drop-below" warns "400 loose pieces dropped" retile crumbs.obj -o m.obj --vertices 500 \
+    --drop-below 0.1% --stats stats.json
+check "leaves the body" figures components=1 vertices=500
+for bad in x -1 2% 5; do
+    refuses 2 "--weld" cube.obj -o n.obj --vertices 100 --weld $bad
+done
+for bad in x -1 101% 2; do
+    refuses 2 "--drop-below" cube.obj -o n.obj --vertices 100 --drop-below $bad
+done
+
 # ---- mended
 { cat cube.obj; printf 'f 1 3 4 2\nv 9 9 9\nf 2 2 3\n'; } >dirty.obj
 check "double faces, a vertex too many" run 0 dirty.obj -o d.ply --vertices 100 --stats stats.json
-check "are told" sh -c "grep -q '\"mended\": \[0, 1, [01], 2, 0, 0, 0\]' stats.json || {
+check "are told" sh -c "grep -q '\"mended\": \[0, 1, [01], 2, 0, 0, 0, 0, 0, 0, 0, 0, 0\]' stats.json || {
     cat stats.json; exit 1; }"
 sed 's/^f 2 4 8 6/f 6 8 4 2/' cube.obj >turned.obj
 check "a side turned over" run 0 turned.obj -o d.ply --vertices 100 --stats stats.json
-check "is told" figures "mended=[0, 0, 0, 0, 0, 2, 0]" euler=2
+check "is told" figures "mended=[0, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0]" euler=2
 
 # ---- texture
 "$root/build/draw" cells cells.png 96

@@ -28,8 +28,13 @@ static const cli_manual retile_manual = {
     "  their color, tilted by nx ny nz or qx qy qz qw; a mesh is put on every triangle as it\n"
     "  is. A .glb holds the surface and instances (EXT_mesh_gpu_instancing); .ply and .obj\n"
     "  hold only the meshes or points.\n"
-    "'mended' of --stats counts repairs: vertices welded, unused and split, triangles\n"
-    "degenerate, duplicate and reversed, and fins. 'quality' is twice the radius of the inscribed\n"
+    "Any set of triangles will do. Vertices in the same place are welded, and on borders those\n"
+    "that nearly are; sheets that share an edge are separated, one-sided ones cut, T-junctions\n"
+    "stitched; crumbs are dropped where hundreds would take the vertices of the body. One\n"
+    "warning line says what was done.\n"
+    "'mended' of --stats counts repairs: vertices welded, unused, triangles degenerate and\n"
+    "duplicate, fins, triangles reversed, vertices split, edges of several triangles, triangles\n"
+    "left over there, edges cut, vertices close and stitched, pieces dropped. 'quality' is twice the radius of the inscribed\n"
     "circle over that of the circumscribed one: 1 for an equilateral triangle.\n",
     "  texkit retile bunny.obj -o bunny.glb --vertices 5000 --tiles gravel-triangles\n"
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
@@ -266,6 +271,7 @@ static int retile(retile_job *j) {
     free(scale);
     free(seams);
     if (status) return status;
+    retile_tell_repairs(j);
     warn_of_volume(j);
     j->output.vertex_count = j->result->vertex_count;
     j->output.triangle_count = j->result->triangle_count;
@@ -306,6 +312,11 @@ static int run_job(retile_job *j, int argc, char **argv) {
          0, 100},
         {CLI_INT, "--spacing", "PERCENT",
          "length of edges along creases and borders, 25 to 400 % of the others", &spacing, 25, 400},
+        {CLI_TEXT, "--weld", "EPS",
+         "weld vertices closer than this, in units of MESH or % of its diagonal; 0 = none", &j->weld, 0,
+         0},
+        {CLI_TEXT, "--drop-below", "SHARE",
+         "drop loose pieces of less than this part of the area, as 0.1%", &j->drop_below, 0, 0},
         {CLI_INPUT, "--density", "MAP",
          "picture on MESH's texture: shorter edges where it is lighter", &j->density, 0, 0},
         {CLI_TILES, "--tiles", "DIR", "texture: a triangle set of 'texkit tiles'", &j->tiles, 0, 0},
@@ -341,6 +352,7 @@ static int run_job(retile_job *j, int argc, char **argv) {
     if (!status && j->instances) /* it lies on a triangle between 0 and 1 */
         status = read_mesh(j, j->instances, MESH_POINTS | MESH_UNMOVED, &j->patch);
     if (!status) warn_of_stl(j);
+    if (!status) status = retile_repair_options(j);
     if (!status) status = retile(j);
     if (!status) status = retile_dress(j);
     if (!status) {

@@ -1,7 +1,7 @@
 /* retile.h - what the files of 'texkit retile' share
    SPDX-License-Identifier: MIT OR Unlicense
 
-   retile.c holds the command; retile_dress.c gives the result colors and textures,
+   retile.c holds the command; retile_repairs.c says what is repaired, retile_dress.c gives the result colors and textures,
    retile_instances.c puts objects on it, mesh_figures.c measures it.                            */
 #ifndef RETILE_H
 #define RETILE_H
@@ -19,6 +19,7 @@ typedef struct retile_job {
 
     /* options */
     trimesh_desc desc;
+    const char *weld, *drop_below; /* as the user wrote them */
     const char *tiles, *patches, *instances, *texture, *density;
     int patch_count, gutter, dot, curved;
     int keep_seams, no_seams; /* as given */
@@ -48,6 +49,14 @@ typedef struct retile_job {
 
 /* Colors, texture coordinates, the picture and instances. */
 int retile_dress(retile_job *j);
+
+/* ---- retile_repairs.c ---- */
+
+/* The options --weld and --drop-below; the mesh has been read. */
+int retile_repair_options(retile_job *j);
+
+/* One warning line that says what was repaired, if anything was. */
+void retile_tell_repairs(retile_job *j);
 
 /* ---- retile_instances.c ---- */
 
