@@ -74,7 +74,7 @@ static txm_status tmr_check_surface(const trimesh_desc *desc, txm_env *env) {
     if (status != TXM_OK) return status;
     if (desc->surface.vertex_count == 0 || desc->surface.face_count == 0)
         return txm_fail(env, TXM_TOO_SMALL, "surface: no vertices or no triangles");
-    if (!(desc->weld >= -1 && desc->weld <= 0.01f))
+    if (!(desc->weld >= 0 && desc->weld <= 0.01f) && !(desc->weld >= -1 && desc->weld <= -1))
         return txm_fail(env, TXM_BAD_ARGUMENT, "weld must be 0 to 0.01, or -1 for none");
     return desc->scale ? tmr_check_scale(desc, env) : TXM_OK;
 }

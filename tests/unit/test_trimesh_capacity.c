@@ -119,7 +119,7 @@ static void test_crosses(void **state) {
 
 static void test_soup(void **state) {
     (void)state;
-    make_soup(1, 1e-6);
+    make_soup(1, 1e-3);
     retile_both(1000);
 }
 
