@@ -120,10 +120,10 @@ int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, doubl
             if (angle < least_angle) least_angle = angle;
         }
     }
-    const int mended[13] = {(int)r->welded,   (int)r->unused, (int)r->degenerate, (int)r->duplicate,
-                            (int)r->fins,     (int)r->turned, (int)r->split,      (int)r->overfull,
-                            (int)r->opened,   (int)r->cut,    (int)r->closed,     (int)r->stitched,
-                            (int)r->dropped};
+    const int mended[7] = {(int)r->welded, (int)r->unused, (int)r->degenerate, (int)r->duplicate,
+                           (int)r->fins, (int)r->turned, (int)r->split};
+    const int repaired[6] = {(int)r->overfull, (int)r->opened,   (int)r->cut,
+                             (int)r->closed,   (int)r->stitched, (int)r->dropped};
     *mean_quality = spread_mean(&qualities);
     *valence_6 = f.inner > 0 ? f.six / f.inner : 0;
     cli_figure(run, "vertices", (double)m->vertex_count);
@@ -132,7 +132,8 @@ int mesh_figures(cli *run, const trimesh_mesh *m, const trimesh_report *r, doubl
                (double)m->vertex_count - (double)f.edges + (double)m->triangle_count);
     cli_figure(run, "components", (double)f.components);
     cli_figure(run, "loops", (double)f.loops);
-    cli_figures(run, "mended", mended, 13);
+    cli_figures(run, "mended", mended, 7);
+    cli_figures(run, "repaired", repaired, 6);
     cli_figure(run, "crease_edges", (double)r->crease_edges);
     cli_figure(run, "seam_edges", (double)r->seam_edges);
     cli_figure(run, "edge_length", m->edge_length * scale);

@@ -32,10 +32,11 @@ static const cli_manual retile_manual = {
     "that nearly are; sheets that share an edge are separated, one-sided ones cut, T-junctions\n"
     "stitched; crumbs are dropped where hundreds would take the vertices of the body. One\n"
     "warning line says what was done.\n"
-    "'mended' of --stats counts repairs: vertices welded, unused, triangles degenerate and\n"
-    "duplicate, fins, triangles reversed, vertices split, edges of several triangles, triangles\n"
-    "left over there, edges cut, vertices close and stitched, pieces dropped. 'quality' is twice the radius of the inscribed\n"
-    "circle over that of the circumscribed one: 1 for an equilateral triangle.\n",
+    "'mended' of --stats counts vertices welded and unused, triangles degenerate and duplicate,\n"
+    "fins, triangles reversed, vertices split; 'repaired' edges of more than two triangles,\n"
+    "triangles left over there, edges cut, vertices close and stitched, pieces dropped.\n"
+    "'quality' is twice the radius of the inscribed circle over that of the circumscribed one:\n"
+    "1 for an equilateral triangle.\n",
     "  texkit retile bunny.obj -o bunny.glb --vertices 5000 --tiles gravel-triangles\n"
     "  texkit retile cell.ply -o cell.glb --vertices 800 --instances lipids.ply\n",
     1, "mesh", 0, "take fewer vertices", ".glb"};
@@ -313,7 +314,7 @@ static int run_job(retile_job *j, int argc, char **argv) {
         {CLI_INT, "--spacing", "PERCENT",
          "length of edges along creases and borders, 25 to 400 % of the others", &spacing, 25, 400},
         {CLI_TEXT, "--weld", "EPS",
-         "weld vertices closer than this, in units of MESH or % of its diagonal; 0 = none", &j->weld, 0,
+         "weld vertices closer than this, in units of MESH or % of its size; 0 = none", &j->weld, 0,
          0},
         {CLI_TEXT, "--drop-below", "SHARE",
          "drop loose pieces of less than this part of the area, as 0.1%", &j->drop_below, 0, 0},
