@@ -7705,6 +7705,10 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         if (status != TXM_OK || faults == 0) return status;
         status = tmr_surface_crosses(job, TMR_ANY_CROSSING, &crosses);
         if (status != TXM_OK || crosses) return status;
+        if (50 * faults > (long)job->w.m.live_faces) { /* so many: sheets lie on each other */
+            status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);
+            if (status != TXM_OK || crosses) return status;
+        }
     }
     status = tmr_job_retry(job, &again);
     if (status != TXM_OK || again) return status;
