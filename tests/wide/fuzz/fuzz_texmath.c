@@ -2,11 +2,11 @@
    SPDX-License-Identifier: MIT OR Unlicense; fuzzkit.h says how to run it
 
    Views that are none must be refused; after an error results are untouched; hidden colour must not
-   matter, and what is known stays as it is.                                                       */
+   matter, and what is known stays as it is. Sides of meshes of all kinds must be sorted and linked.  */
 #include "texmath.h"
 
 #define FUZZ_BYTES 160
-#include "fuzzkit.h"
+#include "soupkit.h"
 
 enum { MOST_SIDE = 40 };
 
@@ -156,15 +156,50 @@ static void cut(pool *p, source *s) {
     fuzz_succeeded++;
 }
 
+/* Meshes that pass the check: their sides in order, and each in one ring with those of its edge. */
+static void sides(pool *p, source *s) {
+    static soup m;
+    make_soup(&m, s);
+    txm_mesh mesh = view_of(&m, p);
+    txm_env env;
+    memset(&env, 0, sizeof env);
+    if (pick(s, 4) == 0 && m.faces % 4 == 0) {
+        mesh.corners = 4;
+        mesh.face_count = m.faces / 4 * 3;
+    }
+    const size_t most = pick(s, 20) ? 0 : (size_t)pick(s, 300);
+    const txm_status status = txm_mesh_check(&mesh, "mesh", pick(s, 3) ? 0 : 3 + pick(s, 2), pick(s, 2), most, &env);
+    must(status == TXM_OK || env.message[0]);
+    const size_t count = txm_mesh_sides(&mesh);
+    if (status != TXM_OK || count == 0) return;
+    uint32_t *sorted = (uint32_t *)(void *)take(p, 2 * count * sizeof *sorted);
+    uint32_t *next = (uint32_t *)(void *)take(p, count * sizeof *next);
+    uint8_t *seen = take(p, count);
+    memset(seen, 0, count);
+    txm_mesh_sort_sides(&mesh, sorted);
+    for (size_t i = 0; i < count; i++) {
+        must(sorted[i] < count && !seen[sorted[i]]++);
+        must(i == 0 || txm_mesh_before(&mesh, sorted[i - 1], sorted[i]));
+    }
+    txm_mesh_link(&mesh, sorted, pick(s, 4), next);
+    memset(seen, 0, count);
+    for (size_t i = 0; i < count; i++) {
+        must(next[i] < count && !seen[next[i]]++);
+        must(txm_mesh_low(&mesh, i) == txm_mesh_low(&mesh, next[i]) && txm_mesh_high(&mesh, i) == txm_mesh_high(&mesh, next[i]));
+    }
+    fuzz_succeeded++;
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static pool p;
     source s = source_of(data, size);
-    switch (pick(&s, 6)) {
+    switch (pick(&s, 7)) {
     case 0: view(&s); break;
     case 1: halve(&p, &s); break;
     case 2: bleed(&p, &s); break;
     case 3: poisson(&p, &s); break;
     case 4: even(&p, &s); break;
+    case 5: sides(&p, &s); break;
     default: cut(&p, &s); break;
     }
     drain(&p);

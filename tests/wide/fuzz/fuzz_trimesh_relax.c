@@ -32,6 +32,13 @@ static trimesh_desc make_desc(pool *p, source *s, const soup *m, trimesh_report 
         if (kind == 2) scale[pick(s, (int)m->vertices)] = any_number(s, 0, 2000);
         d.scale = scale;
     }
+    if (pick(s, 4) == 0) { /* seams at random, or along lines */
+        const int kind = pick(s, 3);
+        uint32_t *seams = (uint32_t *)(void *)take(p, 3 * m->faces * sizeof *seams);
+        for (size_t i = 0; i < 3 * m->faces; i++)
+            seams[i] = kind == 0 ? (uint32_t)pick(s, 65536) : kind == 1 ? (uint32_t)(i / 60) : m->indices[i] / 5;
+        d.seams = seams;
+    }
     if (pick(s, 3) == 0) d.adapt = any_number(s, 0, 1);
     if (pick(s, 3) == 0) d.crease_angle = any_number(s, 1, 180);
     if (pick(s, 4) == 0) d.line_spacing = any_number(s, 0.25f, 4);
