@@ -2189,6 +2189,7 @@ enum { TMR_WALK_MOST = 96 };    /* faces that a walk crosses at most            
 #define TMR_BAND_WIDTH 1.8      /* widest strip, in edge lengths: a fillet that turns by 90 degrees
                                    turns by 50 in one edge length                              */
 #define TMR_BAND_FLAT 0.45      /* a flat is as wide as this, in edge lengths                    */
+#define TMR_FLAT_RATIO 2        /* of the widths of a flat and of the chamfer beside it, at least  */
 #define TMR_BAND_SHIFT 0.85     /* how far a strip may be moved, in edge lengths                 */
 #define TMR_BAND_BENT 0.14      /* how much a flat may turn: 2 sin of half the angle, 8 degrees  */
 #define TMR_BAND_EVEN 0.026     /* what belongs to the flat turns by less: 1.5 degrees           */
@@ -2421,22 +2422,31 @@ static int tmr_band_at(const tmr_surface *s, int32_t c, double sharp, double spa
     return tmr_measure_band(s, &profile, low, high, sharp, spacing, band);
 }
 
-/* Do flats begin on both sides of the edge opposite to corner c? A single triangle is none: scans
-   consist of such. */
-static int tmr_is_between_flats(const tmr_surface *s, int32_t c, double spacing) {
+/* How wide is the flat that begins at the edge opposite to corner c, on its side? */
+static double tmr_flat_width(const tmr_surface *s, int32_t c) {
     tmr_walk walk;
-    int32_t first, flat;
-    spacing = tmr_spacing_at(s, c, spacing);
+    int32_t i = 0;
+    tmr_walk_across(s, c, 1e30, &walk); /* to the border, or as far as a walk goes */
+    while (i < walk.count && tmr_chord(s, walk.face[0], walk.face[i]) <= TMR_BAND_BENT) i++;
+    return walk.way[i];
+}
+
+/* Is the edge opposite to corner c one of a part, between two flats? They begin there on both sides. A
+   single triangle is none: scans consist of such. Of a chamfer and the flat beside it one is much
+   wider than the other; facets of a coarse mesh of something round are all alike. */
+static int tmr_is_between_flats(const tmr_surface *s, int32_t c, double spacing) {
+    double width[2];
+    const double least = TMR_BAND_FLAT * tmr_spacing_at(s, c, spacing);
     for (int side = 0; side < 2; side++) {
         const int32_t k = side ? s->opposite[c] : c;
         const int32_t x = s->opposite[tmr_next(k)], y = s->opposite[tmr_prev(k)];
         if ((x < 0 || tmr_chord(s, k / 3, x / 3) > TMR_BAND_SAME) &&
             (y < 0 || tmr_chord(s, k / 3, y / 3) > TMR_BAND_SAME))
             return 0;
-        if (!tmr_walk_across(s, k, TMR_BAND_FLAT * spacing, &walk)) return 0;
-        if (!tmr_find_flat(s, &walk, TMR_BAND_FLAT * spacing, &first, &flat) || first > 0) return 0;
+        width[side] = tmr_flat_width(s, k);
+        if (width[side] < least) return 0;
     }
-    return 1;
+    return fmax(width[0], width[1]) >= TMR_FLAT_RATIO * fmin(width[0], width[1]);
 }
 
 /* ---- creases and borders as lines --------------------------------------------------------- */
