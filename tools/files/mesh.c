@@ -139,7 +139,7 @@ int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **
     if (!is_glb && !scene_part_count(scene)) return *why = "there is no surface to write", 0;
     int ok;
     if (is_glb) ok = mesh_write_glb(scene, &s);
-    else if (!strcmp(extension, ".ply")) 
+    else if (!strcmp(extension, ".ply"))
         ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &scene->place, &s);
     else if (!strcmp(extension, ".stl")) ok = mesh_write_stl(scene, &s);
     else ok = mesh_write_obj(scene, &s);
