@@ -2401,6 +2401,14 @@ static int tmr_turns_fast(const tmr_surface *s, int32_t c, double sharp, double 
     return turn * TMR_BAND_WIDTH * spacing * length > 0.4 * sharp * height;
 }
 
+/* Does a flat, at least that wide, begin at the edge opposite to corner c, on its side? */
+static int tmr_is_beside_flat(const tmr_surface *s, int32_t c, double least) {
+    tmr_walk walk;
+    int32_t first, flat;
+    return tmr_walk_across(s, c, least, &walk) && tmr_find_flat(s, &walk, least, &first, &flat) &&
+           first == 0;
+}
+
 /* Is the edge opposite to corner c part of a strip? sharp: the turn that makes a crease, as
    tmr_chord has it. */
 static int tmr_band_at(const tmr_surface *s, int32_t c, double sharp, double spacing,
@@ -2412,6 +2420,8 @@ static int tmr_band_at(const tmr_surface *s, int32_t c, double sharp, double spa
     if (s->opposite[c] < c) return 0; /* the border, or seen from the other side */
     if (!tmr_turns_fast(s, c, sharp, spacing)) return 0;
     const double reach = (TMR_BAND_WIDTH + TMR_BAND_FLAT) * spacing, least = TMR_BAND_FLAT * spacing;
+    if (tmr_is_beside_flat(s, c, least) && tmr_is_beside_flat(s, s->opposite[c], least))
+        return 0; /* the usual case, seen from near */
     if (!tmr_walk_across(s, c, reach, &left) || !tmr_find_flat(s, &left, least, first, flat)) return 0;
     if (!tmr_walk_across(s, s->opposite[c], reach, &right) ||
         !tmr_find_flat(s, &right, least, first + 1, flat + 1))
@@ -4015,9 +4025,9 @@ static int tmr_merge_ridges(const tmr_ridges *r, const tmr_ridge *a, const tmr_r
            tmr_farthest(sum) <= sum->reach;
 }
 
-/* the ridge that ridge k was merged into */
+/* The ridge that ridge k was merged into; shortens the way there. */
 static int32_t tmr_ridge_root(const tmr_ridges *r, int32_t k) {
-    while (r->ridge[k].into != k) k = r->ridge[k].into;
+    while (r->ridge[k].into != k) k = r->ridge[k].into = r->ridge[r->ridge[k].into].into;
     return k;
 }
 

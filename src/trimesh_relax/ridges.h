@@ -216,9 +216,9 @@ static int tmr_merge_ridges(const tmr_ridges *r, const tmr_ridge *a, const tmr_r
            tmr_farthest(sum) <= sum->reach;
 }
 
-/* the ridge that ridge k was merged into */
+/* The ridge that ridge k was merged into; shortens the way there. */
 static int32_t tmr_ridge_root(const tmr_ridges *r, int32_t k) {
-    while (r->ridge[k].into != k) k = r->ridge[k].into;
+    while (r->ridge[k].into != k) k = r->ridge[k].into = r->ridge[r->ridge[k].into].into;
     return k;
 }
 
