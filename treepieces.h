@@ -3167,7 +3167,8 @@ static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
         place.species = (int)txm_rng_below(&rng, (uint32_t)p->desc->species_count);
     }
     place.turn = 6.2831853f * txm_rng_float(&rng);
-    place.seed = (uint64_t)txm_rng_next(&rng) << 32 | txm_rng_next(&rng);
+    const uint64_t high = txm_rng_next(&rng); /* before the low half: operands have no order */
+    place.seed = high << 32 | txm_rng_next(&rng);
     return place;
 }
 
