@@ -410,6 +410,27 @@ static inline void txm_sincos(double angle, double *sine, double *cosine) {
     *cosine = q == 0 ? c : q == 1 ? -s : q == 2 ? -c : s;
 }
 
+/* The angle of (x, y), -pi..pi, to 1e-15; 0 of (0, 0). Both must be finite. Reduced to less than
+   pi/16 by halving twice, then Taylor. The same bits everywhere, as above. */
+static inline double txm_atan2(double y, double x) {
+    const double a = fabs(x), b = fabs(y), most = a > b ? a : b;
+    if (!(most > 0)) return 0;
+    double t = (a > b ? b : a) / most, sum = 0;
+    for (int half = 0; half < 2; half++) t /= 1 + sqrt(1 + t * t);
+    for (int k = 23; k > 0; k -= 2) sum = 1.0 / k - t * t * sum;
+    double angle = 4 * t * sum;
+    if (b > a) angle = TXM_PI / 2 - angle;
+    if (x < 0) angle = TXM_PI - angle;
+    return y < 0 ? -angle : angle;
+}
+
+/* The cosine alone. */
+static inline double txm_cos(double angle) {
+    double sine, cosine;
+    txm_sincos(angle, &sine, &cosine);
+    return cosine;
+}
+
 /* 2^x for x from -1000 to 1000, to 1e-11 of the result: the whole part into the exponent, the rest
    by Taylor. The same bits everywhere, as above. */
 static inline double txm_exp2(double x) {

@@ -62,10 +62,8 @@
               takes 60 bytes per vertex. After an error nothing stays allocated, *mesh is NULL.
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
-   SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
-              Of libm's functions that differ between C libraries, two affect decisions: cos
-              for the limits of angles (creases, corners of lines), and atan2 for the angles that
-              weight normals, order sheets around an edge and find tips.
+   SAME BYTES The same result for any number of threads and on every machine with IEEE arithmetic:
+              sums are taken in double in a fixed order, angles come from texmath.h.
 
    LIMITS
      Uniform triangles cannot show detail that is finer than they are: ears thinner than an edge are
@@ -879,7 +877,7 @@ static int tmr_spokes_make(const tmr_mend *m, int32_t begin, int32_t end, tmr_wh
             u = txm_d3_unit(d);
             w = txm_d3_cross(e, u);
         }
-        s->angle = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
+        s->angle = k ? txm_atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
         s->corner = c;
         s->patch = wheel->patch[c / 3];
         s->along = m->vertex[tmr_next(c)] == low;
@@ -1969,7 +1967,7 @@ static void tmr_vertex_normals(tmr_surface *s) {
         const txm_dvec3 p = s->point[s->vertex[c]];
         const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
         const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        const double angle = atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b));
+        const double angle = txm_atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b));
         txm_dvec3 *n = s->vertex_normal + s->vertex[c];
         *n = txm_d3_mad(*n, s->normal[c / 3], angle);
     }
@@ -2500,9 +2498,9 @@ static double tmr_turn_at(const tmr_surface *s, int32_t c) {
    an edge of the result, as beside a chamfer, TMR_GENTLE_CREASE of the angle is enough. Writes 1 per
    corner into s->edge_kind. Returns how many edges are creases. */
 static size_t tmr_find_creases(tmr_surface *s, double angle, double spacing) {
-    const double least = angle >= 180 ? 3 : 1 - cos(angle * (TXM_PI / 180));
-    const double gentle = angle >= 180 ? 3 : 1 - cos(TMR_GENTLE_CREASE * angle * (TXM_PI / 180));
-    const double sure = fmax(least, 1 - cos(75 * (TXM_PI / 180)));
+    const double least = angle >= 180 ? 3 : 1 - txm_cos(angle * (TXM_PI / 180));
+    const double gentle = angle >= 180 ? 3 : 1 - txm_cos(TMR_GENTLE_CREASE * angle * (TXM_PI / 180));
+    const double sure = fmax(least, 1 - txm_cos(75 * (TXM_PI / 180)));
     size_t count = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t o = s->opposite[c];
@@ -2642,7 +2640,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
         turn[v] = (float)(1 + txm_d3_dot(tmr_line_direction(s, ends, v, c, reach),
                                          tmr_line_direction(s, ends, v, d, reach)));
     }
-    const float limit = (float)(1 - cos(40 * TXM_PI / 180));
+    const float limit = (float)(1 - txm_cos(40 * TXM_PI / 180));
     for (int32_t v = 0; v < n; v++) {
         int sharpest = turn[v] > limit;
         for (int32_t k = ends->first[v]; k < ends->first[v + 1] && sharpest; k++) {
@@ -2674,7 +2672,7 @@ static void tmr_angle_defects(const tmr_surface *s, float *defect) {
         const txm_dvec3 p = s->point[s->vertex[c]];
         const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
         const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        defect[s->vertex[c]] -= txm_float(atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b)));
+        defect[s->vertex[c]] -= txm_float(txm_atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b)));
     }
 }
 
@@ -4359,7 +4357,7 @@ static txm_status tmr_make_ridges(tmr_surface *s, double angle, double spacing, 
     r.s = s;
     r.env = env;
     r.spacing = spacing;
-    r.sharp = sqrt(2 - 2 * cos(angle * (TXM_PI / 180)));
+    r.sharp = sqrt(2 - 2 * txm_cos(angle * (TXM_PI / 180)));
     r.strip = (uint8_t *)txm_arena_zero(scratch, faces, 1);
     r.length = (float *)txm_arena_zero(scratch, faces, sizeof(float));
     if (!r.strip || !r.length) return TXM_OUT_OF_MEMORY;

@@ -62,10 +62,8 @@
               takes 60 bytes per vertex. After an error nothing stays allocated, *mesh is NULL.
    THREADS    No global state; calls with different env may overlap. Relaxation and projection run
               on the environment's parallel-for.
-   SAME BYTES The same result for any number of threads: sums are taken in double in a fixed order.
-              Of libm's functions that differ between C libraries, two affect decisions: cos
-              for the limits of angles (creases, corners of lines), and atan2 for the angles that
-              weight normals, order sheets around an edge and find tips.
+   SAME BYTES The same result for any number of threads and on every machine with IEEE arithmetic:
+              sums are taken in double in a fixed order, angles come from texmath.h.
 
    LIMITS
      Uniform triangles cannot show detail that is finer than they are: ears thinner than an edge are

@@ -45,9 +45,9 @@ static double tmr_turn_at(const tmr_surface *s, int32_t c) {
    an edge of the result, as beside a chamfer, TMR_GENTLE_CREASE of the angle is enough. Writes 1 per
    corner into s->edge_kind. Returns how many edges are creases. */
 static size_t tmr_find_creases(tmr_surface *s, double angle, double spacing) {
-    const double least = angle >= 180 ? 3 : 1 - cos(angle * (TXM_PI / 180));
-    const double gentle = angle >= 180 ? 3 : 1 - cos(TMR_GENTLE_CREASE * angle * (TXM_PI / 180));
-    const double sure = fmax(least, 1 - cos(75 * (TXM_PI / 180)));
+    const double least = angle >= 180 ? 3 : 1 - txm_cos(angle * (TXM_PI / 180));
+    const double gentle = angle >= 180 ? 3 : 1 - txm_cos(TMR_GENTLE_CREASE * angle * (TXM_PI / 180));
+    const double sure = fmax(least, 1 - txm_cos(75 * (TXM_PI / 180)));
     size_t count = 0;
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t o = s->opposite[c];
@@ -187,7 +187,7 @@ static txm_status tmr_find_corners(const tmr_surface *s, const tmr_ends *ends, d
         turn[v] = (float)(1 + txm_d3_dot(tmr_line_direction(s, ends, v, c, reach),
                                          tmr_line_direction(s, ends, v, d, reach)));
     }
-    const float limit = (float)(1 - cos(40 * TXM_PI / 180));
+    const float limit = (float)(1 - txm_cos(40 * TXM_PI / 180));
     for (int32_t v = 0; v < n; v++) {
         int sharpest = turn[v] > limit;
         for (int32_t k = ends->first[v]; k < ends->first[v + 1] && sharpest; k++) {
@@ -219,7 +219,7 @@ static void tmr_angle_defects(const tmr_surface *s, float *defect) {
         const txm_dvec3 p = s->point[s->vertex[c]];
         const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
         const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        defect[s->vertex[c]] -= txm_float(atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b)));
+        defect[s->vertex[c]] -= txm_float(txm_atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b)));
     }
 }
 

@@ -58,7 +58,7 @@ static void tmr_vertex_normals(tmr_surface *s) {
         const txm_dvec3 p = s->point[s->vertex[c]];
         const txm_dvec3 a = txm_d3_sub(s->point[s->vertex[tmr_next(c)]], p);
         const txm_dvec3 b = txm_d3_sub(s->point[s->vertex[tmr_prev(c)]], p);
-        const double angle = atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b));
+        const double angle = txm_atan2(txm_d3_len(txm_d3_cross(a, b)), txm_d3_dot(a, b));
         txm_dvec3 *n = s->vertex_normal + s->vertex[c];
         *n = txm_d3_mad(*n, s->normal[c / 3], angle);
     }

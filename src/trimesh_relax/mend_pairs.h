@@ -77,7 +77,7 @@ static int tmr_spokes_make(const tmr_mend *m, int32_t begin, int32_t end, tmr_wh
             u = txm_d3_unit(d);
             w = txm_d3_cross(e, u);
         }
-        s->angle = k ? atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
+        s->angle = k ? txm_atan2(txm_d3_dot(d, w), txm_d3_dot(d, u)) : 0;
         s->corner = c;
         s->patch = wheel->patch[c / 3];
         s->along = m->vertex[tmr_next(c)] == low;

@@ -550,7 +550,7 @@ static txm_status tmr_make_ridges(tmr_surface *s, double angle, double spacing, 
     r.s = s;
     r.env = env;
     r.spacing = spacing;
-    r.sharp = sqrt(2 - 2 * cos(angle * (TXM_PI / 180)));
+    r.sharp = sqrt(2 - 2 * txm_cos(angle * (TXM_PI / 180)));
     r.strip = (uint8_t *)txm_arena_zero(scratch, faces, 1);
     r.length = (float *)txm_arena_zero(scratch, faces, sizeof(float));
     if (!r.strip || !r.length) return TXM_OUT_OF_MEMORY;

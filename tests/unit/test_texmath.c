@@ -272,6 +272,22 @@ static void test_sincos(void **state) {
     assert_true(s == 0 && c == 1);
 }
 
+static void test_atan2(void **state) {
+    (void)state;
+    txm_rng rng = txm_rng_make(9, 9);
+    for (int i = 0; i < 4000; i++) {
+        const double flat = i % 3 ? 1 : 1e-9, steep = i % 5 ? 1 : 1e-6;
+        const double y = (txm_rng_double(&rng) - 0.5) * flat, x = (txm_rng_double(&rng) - 0.5) * steep;
+        assert_near(txm_atan2(y, x), atan2(y, x), 1e-14);
+        assert_near(txm_atan2(1e200 * y, 1e200 * x), atan2(y, x), 1e-14);
+    }
+    assert_near(txm_atan2(0, -1), TXM_PI, 1e-15);
+    assert_near(txm_atan2(1, 0), TXM_PI / 2, 1e-15);
+    assert_near(txm_atan2(-1, 0), -TXM_PI / 2, 1e-15);
+    assert_true(txm_atan2(0, 0) == 0 && txm_atan2(0, 3) == 0);
+    assert_true(txm_cos(0) == 1);
+}
+
 static void test_exp2(void **state) {
     (void)state;
     txm_rng rng = txm_rng_make(6, 6);
@@ -436,7 +452,7 @@ int main(void) {
         cmocka_unit_test(test_arena_inside_itself),
         cmocka_unit_test(test_arena_failing),
         cmocka_unit_test(test_arena_failed),
-        cmocka_unit_test(test_sincos),
+        cmocka_unit_test(test_sincos), cmocka_unit_test(test_atan2),
         cmocka_unit_test(test_exp2),
         cmocka_unit_test(test_log2),
         cmocka_unit_test(test_lowest_bit),
