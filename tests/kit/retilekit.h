@@ -179,13 +179,7 @@ static inline void make_eight(int n) {
 static trimesh_report report;
 
 static inline trimesh_desc describe(size_t vertices, trimesh_method method) {
-    trimesh_desc d;
-    memset(&d, 0, sizeof d);
-    d.surface.positions = in.at;
-    d.surface.indices = in.t;
-    d.surface.vertex_count = in.vertices;
-    d.surface.face_count = in.triangles;
-    d.vertices = vertices;
+    trimesh_desc d = desc_of_in(vertices);
     d.method = method;
     return d;
 }

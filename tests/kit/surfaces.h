@@ -17,6 +17,18 @@ typedef struct shape {
 
 static shape in;
 
+/* The surface as it is handed over, to be retiled with so many vertices. */
+static inline trimesh_desc desc_of_in(size_t vertices) {
+    trimesh_desc desc;
+    memset(&desc, 0, sizeof desc);
+    desc.surface.positions = in.at;
+    desc.surface.vertex_count = in.vertices;
+    desc.surface.indices = in.t;
+    desc.surface.face_count = in.triangles;
+    desc.vertices = vertices;
+    return desc;
+}
+
 static inline uint32_t vertex(double x, double y, double z) {
     float *p = in.at + 3 * in.vertices;
     assert_true(in.vertices < MOST_VERTICES);

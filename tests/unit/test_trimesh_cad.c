@@ -177,15 +177,8 @@ static void check_outside(const trimesh_mesh *mesh, double fit) {
 }
 
 static trimesh_mesh *retile(size_t vertices, trimesh_report *report) {
-    trimesh_desc d;
+    trimesh_desc d = desc_of_in(vertices);
     trimesh_mesh *mesh = NULL;
-    memset(&d, 0, sizeof d);
-    d.surface.positions = in.at;
-    d.surface.vertex_count = in.vertices;
-    d.surface.indices = in.t;
-    d.surface.face_count = in.triangles;
-    d.surface.corners = 3;
-    d.vertices = vertices;
     d.report = report;
     assert_int_equal(trimesh_retile(&d, NULL, &mesh), TXM_OK);
     assert_int_equal(mesh->vertex_count, vertices);
@@ -258,16 +251,9 @@ static txm_status sweep_part(void *context, txm_env *env) {
     return status;
 }
 static void sweep(void **state) {
-    trimesh_desc d;
     (void)state;
     make_box(0.02);
-    memset(&d, 0, sizeof d);
-    d.surface.positions = in.at;
-    d.surface.vertex_count = in.vertices;
-    d.surface.indices = in.t;
-    d.surface.face_count = in.triangles;
-    d.surface.corners = 3;
-    d.vertices = 200;
+    trimesh_desc d = desc_of_in(200);
     assert_true(tk_sweep(sweep_part, &d, TK_ALLOCATION) > 10);
     assert_true(tk_sweep(sweep_part, &d, TK_ONWARD) > 10);
     assert_true(tk_sweep(sweep_part, &d, TK_CANCEL) > 4);

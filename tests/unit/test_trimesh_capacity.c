@@ -14,13 +14,7 @@
 #include "testkit.h"
 
 static trimesh_desc describe(size_t vertices, trimesh_method method) {
-    trimesh_desc d;
-    memset(&d, 0, sizeof d);
-    d.surface.positions = in.at;
-    d.surface.vertex_count = in.vertices;
-    d.surface.indices = in.t;
-    d.surface.face_count = in.triangles;
-    d.vertices = vertices;
+    trimesh_desc d = desc_of_in(vertices);
     d.method = method;
     return d;
 }

@@ -72,12 +72,7 @@ static void test_valence(void **state) {
 /* ---- building and checking ---- */
 
 static trimesh_desc describe(void) {
-    trimesh_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.surface.positions = in.at;
-    desc.surface.indices = in.t;
-    desc.surface.vertex_count = in.vertices;
-    desc.surface.face_count = in.triangles;
+    trimesh_desc desc = desc_of_in(0);
     return desc;
 }
 

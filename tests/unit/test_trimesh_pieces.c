@@ -43,13 +43,7 @@ static void crumbs(int count, double size) {
 }
 
 static trimesh_desc describe(size_t vertices) {
-    trimesh_desc desc;
-    memset(&desc, 0, sizeof desc);
-    desc.surface.positions = in.at;
-    desc.surface.indices = in.t;
-    desc.surface.vertex_count = in.vertices;
-    desc.surface.face_count = in.triangles;
-    desc.vertices = vertices;
+    trimesh_desc desc = desc_of_in(vertices);
     desc.report = &report;
     return desc;
 }

@@ -17,13 +17,7 @@ static uint32_t seams[3 * MOST_TRIANGLES]; /* of `in` */
 static const trimesh_method both[2] = {TRIMESH_LATTICE, TRIMESH_REPEL};
 
 static trimesh_desc describe(size_t vertices, trimesh_method method) {
-    trimesh_desc d;
-    memset(&d, 0, sizeof d);
-    d.surface.positions = in.at;
-    d.surface.vertex_count = in.vertices;
-    d.surface.indices = in.t;
-    d.surface.face_count = in.triangles;
-    d.vertices = vertices;
+    trimesh_desc d = desc_of_in(vertices);
     d.method = method;
     d.seams = seams;
     return d;
