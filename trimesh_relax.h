@@ -5943,10 +5943,10 @@ static txm_status tmr_rebuild(tmr_work *w, int cut, txm_arena *arena, txm_arena 
    the mean of those at its corners, which is exact for a paraboloid. It moves off the
    surface by no more than TMR_FIT_OUT, except where the surface is round all around: beside a fillet
    it would stick out. On a flat it stays. */
-#define TMR_FIT_OUT 0.02f   /* ours: in edge lengths                                           */
-#define TMR_FIT_MOST 0.15f  /* ours: where it is round                                         */
-#define TMR_FIT_EVEN 1e-4f  /* ours: triangles of lower height lie in a flat                   */
-#define TMR_FIT_ROUND 0.3f  /* ours: it is, if the second lowest height is this part of the mean */
+#define TMR_FIT_OUT 0.02    /* ours: in edge lengths                                           */
+#define TMR_FIT_MOST 0.15   /* ours: where it is round                                         */
+#define TMR_FIT_EVEN 1e-4   /* ours: triangles of lower height lie in a flat                   */
+#define TMR_FIT_ROUND 0.3   /* ours: it is, if the second lowest height is this part of the mean */
 
 static double tmr_height_over(const tmr_work *w, int32_t face) {
     const tmr_mesh *m = &w->m;
@@ -5975,20 +5975,20 @@ static int tmr_may_fit(const tmr_work *w, int32_t v) {
 /* How far may vertex v move out of the surface (sign 1) or into it (-1)? Not at all if triangles
    around it lie in a flat. On a smooth surface the heights over the triangles around are nearly
    equal; the second lowest one tells such places from those beside a fillet, where some are high. */
-static float tmr_fit_limit(const tmr_work *w, int32_t v, float sign) {
+static float tmr_fit_limit(const tmr_work *w, int32_t v, double sign) {
     const tmr_mesh *m = &w->m;
-    const float unit = txm_float(w->length * w->size[v]);
-    float low[2] = {0, 0}, sum = 0; /* the lowest heights, in rising order */
+    const double unit = w->length * w->size[v];
+    double low[2] = {0, 0}, sum = 0; /* the lowest heights, in rising order */
     int count = 0, flat = 0;
     int32_t c = m->corner[v];
     const int32_t first = c;
     do {
         if (!tmr_is_ghost_face(m, c / 3)) {
-            float h = sign * w->height[c / 3];
-            flat += h < TMR_FIT_EVEN * unit && h > -TMR_FIT_EVEN * unit;
+            double h = sign * (double)w->height[c / 3];
+            flat += fabs(h) < TMR_FIT_EVEN * unit;
             sum += h;
             for (int k = 0; k < 2; k++) {
-                const float old = low[k];
+                const double old = low[k];
                 if (k < count && old <= h) continue;
                 low[k] = h;
                 h = old;
@@ -5999,8 +5999,9 @@ static float tmr_fit_limit(const tmr_work *w, int32_t v, float sign) {
         c = tmr_swing(m, c);
     } while (c != first);
     if (flat >= 2 || count == 0) return 0;
-    const float second = low[count > 1 ? 1 : 0];
-    return (second * (float)count < TMR_FIT_ROUND * sum ? TMR_FIT_OUT : TMR_FIT_MOST) * unit;
+    const double second = low[count > 1 ? 1 : 0];
+    const int is_round = second * count >= TMR_FIT_ROUND * sum;
+    return txm_float((is_round ? TMR_FIT_MOST : TMR_FIT_OUT) * unit);
 }
 
 static void tmr_limit_chunk(void *context, int index) {

@@ -583,6 +583,14 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #if defined(TEXSYN_IMPLEMENTATION) && !defined(TEXSYN_IMPLEMENTED)
 #define TEXSYN_IMPLEMENTED
 
+/* gcc 12 for aarch64, from -O1 on, takes functions here that write to memory for pure ones and drops what
+   they do, unless both of these analyses are off. */
+#if defined(__aarch64__) && defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("no-ipa-modref,no-ipa-pure-const")
+#define TXS_POP_OPTIONS
+#endif
+
 #include "texsyn/config.h"
 #include "texsyn/mask.h"
 #include "texsyn/alpha.h"
@@ -620,6 +628,11 @@ TEXSYN_API txm_status texsyn_erosion_intact(const texsyn_erosion_desc *desc, txm
 #include "texsyn/order.h"
 #include "texsyn/laying.h"
 #include "texsyn/erode.h"
+
+#ifdef TXS_POP_OPTIONS
+#pragma GCC pop_options
+#undef TXS_POP_OPTIONS
+#endif
 #endif /* TEXSYN_IMPLEMENTATION */
 
 /* ---- licence ----------------------------------------------------------------------------
