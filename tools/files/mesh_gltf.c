@@ -104,7 +104,10 @@ static int get_items(const gltf *g, const char *name, items *to) {
     to->of = (item *)malloc((count + 1) * sizeof(item));
     if (!to->of) return builder_fail_memory(g->b);
     to->count = 0;
-    if (count) cJSON_ArrayForEach(at, array) to->of[to->count++].json = at;
+    if (count == 0) return 1; /* or no list, which may have members as well */
+    cJSON_ArrayForEach(at, array) {
+        to->of[to->count++].json = at;
+    }
     return 1;
 }
 
@@ -468,8 +471,9 @@ static void count_looks(gltf *g) {
     for (size_t i = 0; i < g->materials.count; i++) {
         const cJSON *look = member(g->materials.of[i].json, "pbrMetallicRoughness");
         int is_white = 1;
-        cJSON_ArrayForEach(at, member(look, "baseColorFactor"))
+        cJSON_ArrayForEach(at, member(look, "baseColorFactor")) {
             is_white &= cJSON_IsNumber(at) && at->valuedouble >= 1;
+        }
         g->b->left_out[LEFT_LOOKS] += !is_white;
     }
 }
