@@ -19,7 +19,7 @@ extern const char cli_versions[];
 /* Exit status of the program. */
 enum { CLI_DONE = 0, CLI_FAILED = 1, CLI_USAGE = 2 };
 
-enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 16, CLI_MAX_LIST = 8, CLI_MAX_PATH = 4096 };
+enum { CLI_MAX_STAGES = 8, CLI_MAX_FIGURES = 32, CLI_MAX_LIST = 8, CLI_MAX_PATH = 4096 };
 
 /* ---- options ---------------------------------------------------------------------------- */
 

@@ -336,7 +336,7 @@ static int write_outputs(output *outputs, int count) {
 
 /* Write all outputs and the statistics, or none. outputs must have room for one more. */
 static int finish(cli *run, output *outputs, int count) {
-    char text[4096];
+    char text[8192];
     const size_t size = cli_end(run, text, sizeof text);
     if (run->stats) {
         outputs[count].path = run->stats;

@@ -3,6 +3,7 @@
 #define _XOPEN_SOURCE 700 /* POSIX: clock_gettime */
 #include "cli.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <time.h>
 
@@ -24,13 +25,13 @@ void cli_stage(cli *run, const char *name) {
 }
 
 void cli_figure(cli *run, const char *name, double value) {
-    if (run->figure_count == CLI_MAX_FIGURES) return;
+    assert(run->figure_count < CLI_MAX_FIGURES);
     run->figures[run->figure_count].name = name;
     run->figures[run->figure_count++].values[0] = value;
 }
 
 void cli_figures(cli *run, const char *name, const int *values, int count) {
-    if (run->figure_count == CLI_MAX_FIGURES || count > CLI_MAX_LIST) return;
+    assert(run->figure_count < CLI_MAX_FIGURES && count <= CLI_MAX_LIST);
     run->figures[run->figure_count].name = name;
     for (int i = 0; i < count; i++) run->figures[run->figure_count].values[i] = values[i];
     run->figures[run->figure_count++].count = count;

@@ -246,11 +246,12 @@ static int retile_surface(retile_job *j, uint32_t *seams) {
     return check_result(&j->run, result, j->run.inputs[0]);
 }
 
-enum { LARGE_CHANGE = 2 }; /* of the volume, in percent: worth a warning */
+enum { LARGE_CHANGE = 5 }; /* of the volume, in percent: worth a warning */
 
 static void warn_of_volume(retile_job *j) {
     const double change = 100 * j->result->volume_change;
     if (change < LARGE_CHANGE && change > -LARGE_CHANGE) return;
+    if (j->desc.crease_angle >= 180) return; /* edges were to be rounded off */
     cli_warn(&j->run, "the volume has changed by %.1f %%: parts of '%s' are too thin for edges of "
              "this length; more vertices keep more of it", change, j->run.inputs[0]);
 }
