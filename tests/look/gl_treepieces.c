@@ -798,6 +798,7 @@ static void test_picture(const char *what, int is_bare, double coverage, double 
                          double near) {
     forest_gl *f = new_scene(1, 120);
     f->o.is_bare = is_bare;
+    f->o.seed = 2;
     if (!is_bare) f->o.orbit[2] = 6; /* impostors are enlarged: no mip-maps */
     f->o.width = 480;
     f->o.height = 480;
