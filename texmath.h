@@ -1121,7 +1121,7 @@ static inline void txm_bleed_row(void *context, int row) {
     else txm_bleed_push(context, b->first + row);
 }
 
-/* Make one level, some rows at a time. b->done counts rows of all levels, of b->rows. */
+/* Make one level, some rows at a time. b->done counts pixels of all levels, of b->pixels. */
 static inline txm_status txm_bleed_level_run(txm_bleed *b, int level, int is_up, txm_env *env) {
     const int width = level ? b->level[level].width : b->image.width;
     const int height = level ? b->level[level].height : b->image.height;

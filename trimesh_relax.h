@@ -3164,6 +3164,23 @@ static txm_status tmr_settle_pieces(tmr_surface *s, const tmr_lines *l, const tr
     return *dropped ? tmr_drop_pieces(s, pieces, report, scratch) : TXM_OK;
 }
 
+/* Find the lines; drop pieces, and then find them again. vertices: of the result; spacing: as
+   tmr_lines_build has it. least: receives how many vertices the pieces that are left need. */
+static txm_status tmr_settle_lines(tmr_surface *s, const trimesh_desc *desc, double vertices,
+                                   double angle, double spacing, txm_arena *arena,
+                                   txm_arena *scratch, trimesh_report *report, tmr_lines *l,
+                                   double *least) {
+    int dropped = 1;
+    for (int round = 0; dropped && round < 2; round++) {
+        txm_status status =
+            tmr_lines_build(s, desc, angle, spacing, arena, scratch, report, l);
+        if (status == TXM_OK)
+            status = tmr_settle_pieces(s, l, desc, vertices, report, scratch, round, least, &dropped);
+        if (status != TXM_OK) return status;
+    }
+    return TXM_OK;
+}
+
 /* ---- the mesh that changes ---------------------------------------------------------------- */
 
 /* Flags of a vertex besides the trimesh_kind in the lowest two bits. */
@@ -7526,20 +7543,14 @@ static double tmr_job_spacing(const trimesh_job *job) {
 
 /* ---- the stages: each sets the next one ----------------------------------------------------- */
 
-/* Find the lines; drop pieces, and then find them again. */
+/* Find the lines, and see whether the vertices are enough for them. */
 static txm_status tmr_job_lines(trimesh_job *job, float angle) {
     const size_t vertices = job->desc.vertices;
     double least = 0;
-    int dropped = 1;
-    for (int round = 0; dropped && round < 2; round++) {
-        txm_status status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job),
-                                            &job->input, &job->scratch, &job->report, &job->l);
-        if (status == TXM_OK)
-            status = tmr_settle_pieces(&job->s, &job->l, &job->desc, (double)vertices,
-                                       &job->report, &job->scratch, round, &least, &dropped);
-        if (status != TXM_OK) return status;
-    }
-    if ((double)vertices >= least) return TXM_OK;
+    const txm_status status =
+        tmr_settle_lines(&job->s, &job->desc, (double)vertices, angle, tmr_job_spacing(job),
+                         &job->input, &job->scratch, &job->report, &job->l, &least);
+    if (status != TXM_OK || (double)vertices >= least) return status;
     job->wanted = (uint64_t)least;
     return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
                             "# vertices are too few for the pieces of the surface, their creases and "
@@ -8604,13 +8615,9 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     const double length = u->old->edge_length / u->s.diagonal;
     if (u->desc.adapt > 0)
         status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
-    for (int round = 0, dropped = 1; dropped && round < 2 && status == TXM_OK; round++) {
-        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch,
-                                 report, &u->l);
-        if (status == TXM_OK)
-            status = tmr_settle_pieces(&u->s, &u->l, &desc, (double)desc.vertices, report,
-                                       &u->scratch, round, &least, &dropped);
-    }
+    if (status == TXM_OK)
+        status = tmr_settle_lines(&u->s, &u->desc, (double)desc.vertices, angle, length, &u->input,
+                                  &u->scratch, report, &u->l, &least);
     if (status != TXM_OK) return status;
     u->w.desc = &u->desc;
     u->w.s = &u->s;

@@ -5,11 +5,6 @@
 
 /* ---- space: which stems are near --------------------------------------------------------- */
 
-#ifndef TREEPIECES_ASSERT
-#include <assert.h>
-#define TREEPIECES_ASSERT(x) assert(x)
-#endif
-
 enum {
     TPC_SPACE_CELLS = 8 /* a stem is entered in at most so many; longer ones in a list of their own */
 };
@@ -77,7 +72,7 @@ static int32_t *tpc_space_head(tpc_space *s, int x, int y, int z) {
 }
 
 static void tpc_space_enter(tpc_space *s, int32_t *head) {
-    TREEPIECES_ASSERT(s->entry_count < s->capacity * TPC_SPACE_CELLS);
+    TXM_ASSERT(s->entry_count < s->capacity * TPC_SPACE_CELLS);
     tpc_entry *e = &s->entries[s->entry_count];
     e->next = *head;
     e->limb = s->limb_count;
@@ -87,7 +82,7 @@ static void tpc_space_enter(tpc_space *s, int32_t *head) {
 /* Add the stem of the next node. */
 static void tpc_space_add(tpc_space *s, const tpc_limb *limb) {
     int least[3], most[3];
-    TREEPIECES_ASSERT(s->limb_count < s->capacity);
+    TXM_ASSERT(s->limb_count < s->capacity);
     s->limbs[s->limb_count] = *limb;
     if (tpc_space_range(s, limb, least, most) > TPC_SPACE_CELLS) {
         tpc_space_enter(s, &s->long_ones);

@@ -81,20 +81,14 @@ static double tmr_job_spacing(const trimesh_job *job) {
 
 /* ---- the stages: each sets the next one ----------------------------------------------------- */
 
-/* Find the lines; drop pieces, and then find them again. */
+/* Find the lines, and see whether the vertices are enough for them. */
 static txm_status tmr_job_lines(trimesh_job *job, float angle) {
     const size_t vertices = job->desc.vertices;
     double least = 0;
-    int dropped = 1;
-    for (int round = 0; dropped && round < 2; round++) {
-        txm_status status = tmr_lines_build(&job->s, &job->desc, angle, tmr_job_spacing(job),
-                                            &job->input, &job->scratch, &job->report, &job->l);
-        if (status == TXM_OK)
-            status = tmr_settle_pieces(&job->s, &job->l, &job->desc, (double)vertices,
-                                       &job->report, &job->scratch, round, &least, &dropped);
-        if (status != TXM_OK) return status;
-    }
-    if ((double)vertices >= least) return TXM_OK;
+    const txm_status status =
+        tmr_settle_lines(&job->s, &job->desc, (double)vertices, angle, tmr_job_spacing(job),
+                         &job->input, &job->scratch, &job->report, &job->l, &least);
+    if (status != TXM_OK || (double)vertices >= least) return status;
     job->wanted = (uint64_t)least;
     return txm_fail_numbers(&job->env, TXM_TOO_SMALL,
                             "# vertices are too few for the pieces of the surface, their creases and "

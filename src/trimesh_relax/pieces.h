@@ -195,4 +195,21 @@ static txm_status tmr_settle_pieces(tmr_surface *s, const tmr_lines *l, const tr
     return *dropped ? tmr_drop_pieces(s, pieces, report, scratch) : TXM_OK;
 }
 
+/* Find the lines; drop pieces, and then find them again. vertices: of the result; spacing: as
+   tmr_lines_build has it. least: receives how many vertices the pieces that are left need. */
+static txm_status tmr_settle_lines(tmr_surface *s, const trimesh_desc *desc, double vertices,
+                                   double angle, double spacing, txm_arena *arena,
+                                   txm_arena *scratch, trimesh_report *report, tmr_lines *l,
+                                   double *least) {
+    int dropped = 1;
+    for (int round = 0; dropped && round < 2; round++) {
+        txm_status status =
+            tmr_lines_build(s, desc, angle, spacing, arena, scratch, report, l);
+        if (status == TXM_OK)
+            status = tmr_settle_pieces(s, l, desc, vertices, report, scratch, round, least, &dropped);
+        if (status != TXM_OK) return status;
+    }
+    return TXM_OK;
+}
+
 #endif /* TRIMESH_RELAX_PIECES_H */

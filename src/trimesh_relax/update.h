@@ -605,13 +605,9 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     const double length = u->old->edge_length / u->s.diagonal;
     if (u->desc.adapt > 0)
         status = tmr_adapt_scale(&u->s, length, u->desc.adapt, &u->input, &u->scratch);
-    for (int round = 0, dropped = 1; dropped && round < 2 && status == TXM_OK; round++) {
-        status = tmr_lines_build(&u->s, &u->desc, angle, length, &u->input, &u->scratch,
-                                 report, &u->l);
-        if (status == TXM_OK)
-            status = tmr_settle_pieces(&u->s, &u->l, &desc, (double)desc.vertices, report,
-                                       &u->scratch, round, &least, &dropped);
-    }
+    if (status == TXM_OK)
+        status = tmr_settle_lines(&u->s, &u->desc, (double)desc.vertices, angle, length, &u->input,
+                                  &u->scratch, report, &u->l, &least);
     if (status != TXM_OK) return status;
     u->w.desc = &u->desc;
     u->w.s = &u->s;

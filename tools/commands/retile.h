@@ -1,8 +1,8 @@
 /* retile.h - what the files of 'texkit retile' share
    SPDX-License-Identifier: MIT OR Unlicense
 
-   retile.c holds the command; retile_repairs.c says what is repaired, retile_dress.c gives the result colors and textures,
-   retile_instances.c puts objects on it, mesh_figures.c measures it.                            */
+   retile.c holds the command; retile_repairs.c says what is repaired, retile_dress.c gives the result
+   colors and textures, retile_instances.c puts objects on it, mesh_figures.c measures it.       */
 #ifndef RETILE_H
 #define RETILE_H
 
