@@ -208,6 +208,11 @@ check "two materials" sh -c "awk '/^f / { if (n++ == 0) print \"mtllib two.mtl\\
     { print }' torus.obj >two.obj"
 check "are kept" run 0 two.obj -o two-out.obj --vertices 400
 check "with the name of their library" grep -qx 'mtllib two.mtl' two-out.obj
+mkdir -p there
+echo newmtl one >two.mtl
+check "which another folder lacks" warns "names 'two.mtl', the materials of 'two.obj'" retile two.obj \
+    -o there/two.obj --vertices 400
+check "or has" sh -c "cp two.mtl there && '$texkit' retile two.obj -o there/two.obj --vertices 400 2>err.log && [ ! -s err.log ]"
 check "in one group each" test "$(grep usemtl two-out.obj | tr '\n' ' ')" = 'usemtl one usemtl two '
 check "each on its half" awk '/^v / { y[++n] = $3 } /^usemtl/ { one = $2 == "one" } /^f / { m = 0
     for (k = 2; k < 5; k++) { split($k, a, "/"); m += y[a[1]] }

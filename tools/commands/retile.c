@@ -161,6 +161,24 @@ static int bake(retile_job *j, mesh_data *baked) {
     return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->run.output, why);
 }
 
+/* Is there a file of this name in the folder of path? */
+static int is_beside(const char *path, const char *name) {
+    char other[CLI_MAX_PATH];
+    const int folder = (int)(name_in(path) - path);
+    if (snprintf(other, sizeof other, "%.*s%s", folder, path, name) >= (int)sizeof other) return 0;
+    FILE *file = fopen(other, "rb");
+    if (file) fclose(file);
+    return file != NULL;
+}
+
+/* OBJ names the file of its materials, which stays where it is. */
+static void warn_of_library(retile_job *j) {
+    const char *library = j->output.library, *in = j->run.inputs[0], *out = j->run.output;
+    if (library && !is_beside(out, library) && is_beside(in, library))
+        cli_warn(&j->run, "'%s' names '%s', the materials of '%s': copy that file beside it", out,
+                 library, in);
+}
+
 static int write_output(retile_job *j) {
     cli *run = &j->run;
     cli_file files[3] = {{0}, {0}, {0}};
@@ -204,6 +222,7 @@ static int write_output(retile_job *j) {
     }
     cli_figure(run, "file_bytes", (double)files[0].size);
     if (!status) status = cli_finish_files(run, files, count);
+    if (!status && !strcmp(j->extension, ".obj") && !scene.library) warn_of_library(j);
     free(bytes);
     free(mtl);
     mesh_free(&baked);
