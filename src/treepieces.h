@@ -330,7 +330,8 @@ TREEPIECES_API txm_status treepieces_preset(const char *name, txm_env *env,
 
 /* Read a species from text: lines "key value ..."; "order N" begins the keys of that order; "like
    NAME" starts from a built-in species; # begins a comment. The keys are the names of the fields;
-   those that are missing keep the values of a small round tree.
+   those that are missing keep the values of a small round tree. The text is UTF-8, with or without
+   a byte order mark; lines end in \n, \r\n or \r.
    return TXM_OK; TXM_BAD_DATA, the message names line and key; *species is untouched then       */
 TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size, txm_env *env,
                                                    treepieces_species *species);

@@ -20,7 +20,7 @@ typedef struct tpc_word {
 } tpc_word;
 
 static int tpc_is_blank(char c) {
-    return c == ' ' || c == '\t' || c == '\r';
+    return c == ' ' || c == '\t';
 }
 
 static int tpc_is_word(const tpc_word *w, const char *text) {
@@ -37,12 +37,13 @@ static int tpc_next_word(tpc_reader *r, tpc_word *w) {
     return w->at < w->end;
 }
 
-/* Fail with "line 7: WORD: fault"; the word may contain anything, or be NULL. */
-static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const char *fault) {
-    char line[220], shown[28];
+enum { TPC_SHOWN = 28 /* of a word in a message, with its 0 */ };
+
+/* Copy a word, which may contain anything or be NULL, for a message; returns its length there. */
+static size_t tpc_show_word(const tpc_word *w, char shown[TPC_SHOWN]) {
     size_t n = 0;
     for (const char *p = w ? w->at : NULL; p && p < w->end; p++) {
-        if (n + 4 >= sizeof shown) {
+        if (n + 4 >= TPC_SHOWN) {
             memcpy(shown + n, "...", 3);
             n += 3;
             break;
@@ -50,6 +51,13 @@ static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const ch
         shown[n++] = (char)(*p > ' ' && *p < 127 ? *p : '?');
     }
     shown[n] = 0;
+    return n;
+}
+
+/* Fail with "line 7: WORD: fault"; the word may be NULL. */
+static txm_status tpc_fail_line(const tpc_reader *r, const tpc_word *w, const char *fault) {
+    char line[220], shown[TPC_SHOWN];
+    const size_t n = tpc_show_word(w, shown);
     snprintf(line, sizeof line, "line %d: %s%s%s", r->line, shown, n ? ": " : "", fault);
     return txm_fail(r->env, TXM_BAD_DATA, line);
 }
@@ -113,6 +121,46 @@ static txm_status tpc_begin_like(tpc_reader *r, const tpc_word *key) {
     return tpc_fail_line(r, &w, "is not a built-in species");
 }
 
+/* How many letters must be inserted, removed or replaced to get from one word to the other. */
+static int tpc_distance(const char *a, const char *b) {
+    const int m = (int)strlen(a), n = (int)strlen(b);
+    int row[TPC_SHOWN]; /* row[j]: from the letters of a so far to the first j of b */
+    TXM_ASSERT(n < TPC_SHOWN);
+    for (int j = 0; j <= n; j++) row[j] = j;
+    for (int i = 1; i <= m; i++) {
+        int diagonal = row[0];
+        row[0] = i;
+        for (int j = 1; j <= n; j++) {
+            const int replaced = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            row[j] = 1 + (row[j] < row[j - 1] ? row[j] : row[j - 1]);
+            if (replaced < row[j]) row[j] = replaced;
+        }
+    }
+    return row[n];
+}
+
+/* Fail with "line 7: unknown key 'flair'", and the key that it was perhaps meant to be. */
+static txm_status tpc_fail_key(const tpc_reader *r, const tpc_word *key) {
+    static const char *const others[] = {"like", "order", "name"};
+    char line[120], shown[TPC_SHOWN];
+    const char *nearest = NULL;
+    const int size = (int)tpc_show_word(key, shown);
+    int least = size < 8 ? (size + 1) / 2 : 4; /* from this on it is another word */
+    for (int i = 0; i < TPC_FIELDS + TPC_ORDER_FIELDS + 3; i++) {
+        const int k = i - TPC_FIELDS, o = k - TPC_ORDER_FIELDS;
+        const char *name = k < 0 ? tpc_fields[i].key : o < 0 ? tpc_order_fields[k].key : others[o];
+        const int distance = tpc_distance(shown, name);
+        if (distance < least) {
+            least = distance;
+            nearest = name;
+        }
+    }
+    snprintf(line, sizeof line, "line %d: unknown key '%s'%s%s%s", r->line, shown,
+             nearest ? "; did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
+    return txm_fail(r->env, TXM_BAD_DATA, line);
+}
+
 static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
     if (tpc_is_word(key, "like")) return tpc_begin_like(r, key);
     if (tpc_is_word(key, "order")) return tpc_begin_order(r, key);
@@ -127,7 +175,7 @@ static txm_status tpc_read_key(tpc_reader *r, const tpc_word *key) {
         field = &tpc_order_fields[i];
         base = &r->species.orders[r->order];
     }
-    if (!field) return tpc_fail_line(r, key, "is not a key");
+    if (!field) return tpc_fail_key(r, key);
     if (!strncmp(field->key, "crown_", 6)) r->crown_line = r->line;
     for (int i = 0; i < field->count; i++) {
         const txm_status status = tpc_read_value(r, key, field, base, i);
@@ -149,6 +197,12 @@ static txm_status tpc_read_line(tpc_reader *r) {
     return TXM_OK;
 }
 
+/* The end of the line that begins here: at \n, \r\n or \r, or at the end of the text. */
+static const char *tpc_line_end(const char *at, const char *end) {
+    while (at < end && *at != '\n' && *at != '\r') at++;
+    return at;
+}
+
 /* Read a text whose missing keys keep the values of *species. */
 static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
                                 treepieces_species *species) {
@@ -159,23 +213,36 @@ static txm_status tpc_read_text(const char *text, size_t size, txm_env *env,
     r.species = *species;
     r.env = env;
     while (at < end) {
-        const char *newline = (const char *)memchr(at, '\n', (size_t)(end - at));
+        const char *line_end = tpc_line_end(at, end);
         r.at = at;
-        r.end = newline ? newline : end;
+        r.end = line_end;
         r.line++;
         r.like = NULL;
         txm_status status = tpc_read_line(&r);
         if (status == TXM_OK && r.like)
             status = tpc_read_text(r.like, strlen(r.like), env, &r.species);
         if (status != TXM_OK) return status;
-        if (!newline) break;
-        at = newline + 1;
+        at = line_end + (end - line_end > 1 && line_end[0] == '\r' && line_end[1] == '\n');
+        if (at < end) at++;
     }
     if (!(r.species.crown_base < r.species.crown_top)) {
         r.line = r.crown_line;
         return tpc_fail_line(&r, NULL, "crown_top must be above crown_base");
     }
     *species = r.species;
+    return TXM_OK;
+}
+
+/* Step over a byte order mark, which editors on Windows put before UTF-8. Other encodings of Unicode
+   begin with marks of their own. */
+static txm_status tpc_skip_mark(const char **text, size_t *size, txm_env *env) {
+    const char *t = *text;
+    if (*size >= 2 && (!memcmp(t, "\xff\xfe", 2) || !memcmp(t, "\xfe\xff", 2)))
+        return txm_fail(env, TXM_BAD_DATA, "line 1: the text is UTF-16; save it as UTF-8");
+    if (*size >= 3 && !memcmp(t, "\xef\xbb\xbf", 3)) {
+        *text += 3;
+        *size -= 3;
+    }
     return TXM_OK;
 }
 
@@ -189,6 +256,7 @@ TREEPIECES_API txm_status treepieces_species_parse(const char *text, size_t size
     txm_status status = tpc_read_text(tpc_fresh, strlen(tpc_fresh), env, &fresh);
     for (int k = 1; k < TREEPIECES_MAX_ORDERS; k++)
         if (k >= fresh.order_count) fresh.orders[k] = fresh.orders[k - 1];
+    if (status == TXM_OK) status = tpc_skip_mark(&text, &size, env);
     if (status == TXM_OK && size) status = tpc_read_text(text, size, env, &fresh);
     if (status != TXM_OK) return status;
     for (int k = fresh.order_count; k < TREEPIECES_MAX_ORDERS; k++)

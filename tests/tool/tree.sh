@@ -102,6 +102,8 @@ check "the species as text" run 0 tree -o mine.txt --species birch
 check "is refused with the line where it is wrong" sh -c "
     sed 's/^leaf_count .*/leaf_count many/' mine.txt >wrong.txt"
 refuses 1 "is not a number" tree -o n.glb --species wrong.txt
+printf '\357\273\277like oak\r\nheight 9\r\n' >wrong.txt
+refuses 1 "line 2: unknown key 'height'" tree -o n.glb --species wrong.txt
 printf 'like oak\nname mine\nleaf_count 0\n' >mine.txt
 check "a species like another" run 0 tree -o mine.glb --species mine.txt --pieces 60
 check "is without its leaves" $check_tree skin mine.glb materials=1
