@@ -477,6 +477,13 @@ typedef struct treepieces_forest {
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out);
 
+/* Where the trees of a forest stand: desc->places, or the jittered grid. For programs that draw the
+   same few trees in many places.
+   places  out, desc->tree_count of them, untouched after an error
+   return  TXM_OK; TXM_BAD_ARGUMENT as of treepieces_forest_make                                 */
+TREEPIECES_API txm_status treepieces_scatter(const treepieces_forest_desc *desc, txm_env *env,
+                                             treepieces_place *places);
+
 /* Release a forest; NULL is allowed. */
 TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
 
@@ -3211,21 +3218,29 @@ typedef struct tpc_planting {
     size_t node_count, cluster_count, node_capacity, band_capacity, cluster_capacity;
 } tpc_planting;
 
+/* The distance of the trees in the grid, metres. */
+static float tpc_spacing(const treepieces_forest_desc *desc) {
+    float spacing = desc->spacing;
+    for (int i = 0; i < desc->species_count && !(desc->spacing > 0); i++)
+        spacing = txm_maxf(spacing, 0.6f * desc->species[i].orders[0].length);
+    return spacing;
+}
+
 /* Where tree i stands if the caller gives no places. */
-static treepieces_place tpc_scatter(const tpc_planting *p, int i) {
+static treepieces_place tpc_scatter(const treepieces_forest_desc *desc, float spacing, int i) {
     treepieces_place place;
     int side = 1;
-    txm_rng rng = txm_rng_make(p->desc->seed, 0x666f7265u + ((uint64_t)i << 32));
-    while (side < 46340 && side * side < p->desc->tree_count) side++;
+    txm_rng rng = txm_rng_make(desc->seed, 0x666f7265u + ((uint64_t)i << 32));
+    while (side < 46340 && side * side < desc->tree_count) side++;
     memset(&place, 0, sizeof place);
-    if (p->desc->tree_count > 1) {
+    if (desc->tree_count > 1) {
         const int column = i % side, row = i / side;
         const float x = (float)column + 0.5f - 0.5f * (float)side;
         const float z = (float)row + 0.5f - 0.5f * (float)side;
-        place.position[0] = p->spacing * (x + 0.6f * (txm_rng_float(&rng) - 0.5f));
-        place.position[2] = p->spacing * (z + 0.6f * (txm_rng_float(&rng) - 0.5f));
+        place.position[0] = spacing * (x + 0.6f * (txm_rng_float(&rng) - 0.5f));
+        place.position[2] = spacing * (z + 0.6f * (txm_rng_float(&rng) - 0.5f));
         place.scale = 0.8f + 0.4f * txm_rng_float(&rng);
-        place.species = (int)txm_rng_below(&rng, (uint32_t)p->desc->species_count);
+        place.species = (int)txm_rng_below(&rng, (uint32_t)desc->species_count);
     }
     place.turn = 6.2831853f * txm_rng_float(&rng);
     const uint64_t high = txm_rng_next(&rng); /* before the low half: operands have no order */
@@ -3237,7 +3252,7 @@ static void tpc_grow_slot(void *context, int i) {
     tpc_planting *p = (tpc_planting *)context;
     tpc_growth *g = &p->slots[i];
     g->index = p->first + i;
-    g->place = p->desc->places ? p->desc->places[g->index] : tpc_scatter(p, g->index);
+    g->place = p->desc->places ? p->desc->places[g->index] : tpc_scatter(p->desc, p->spacing, g->index);
     g->species = &p->desc->species[g->place.species];
     tpc_grow(g);
 }
@@ -3461,6 +3476,17 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
     return TXM_OK;
 }
 
+TREEPIECES_API txm_status treepieces_scatter(const treepieces_forest_desc *desc, txm_env *env,
+                                             treepieces_place *places) {
+    const txm_status status = tpc_check_forest(desc, env);
+    if (status != TXM_OK) return status;
+    if (!places) return txm_fail(env, TXM_BAD_ARGUMENT, "places is NULL");
+    const float spacing = tpc_spacing(desc);
+    for (int i = 0; i < desc->tree_count; i++)
+        places[i] = desc->places ? desc->places[i] : tpc_scatter(desc, spacing, i);
+    return TXM_OK;
+}
+
 TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest) {
     if (!forest) return;
     tpc_forest *f = (tpc_forest *)forest;
@@ -3480,9 +3506,7 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
     tpc_planting p;
     memset(&p, 0, sizeof p);
     p.desc = desc;
-    p.spacing = desc->spacing;
-    for (int i = 0; i < desc->species_count && !(desc->spacing > 0); i++)
-        p.spacing = txm_maxf(p.spacing, 0.6f * desc->species[i].orders[0].length);
+    p.spacing = tpc_spacing(desc);
     txm_arena_init(&p.scratch, env);
     txm_arena_init(&p.band_arena, env);
     txm_arena_init(&arena, env);

@@ -477,6 +477,13 @@ typedef struct treepieces_forest {
 TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *desc, txm_env *env,
                                                  treepieces_forest **out);
 
+/* Where the trees of a forest stand: desc->places, or the jittered grid. For programs that draw the
+   same few trees in many places.
+   places  out, desc->tree_count of them, untouched after an error
+   return  TXM_OK; TXM_BAD_ARGUMENT as of treepieces_forest_make                                 */
+TREEPIECES_API txm_status treepieces_scatter(const treepieces_forest_desc *desc, txm_env *env,
+                                             treepieces_place *places);
+
 /* Release a forest; NULL is allowed. */
 TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
 

@@ -66,6 +66,9 @@ case $profile in ci)
     need has_command llvm-symbolizer llvm
     need has_command pkg-config pkg-config
     need has_command chromium chromium # runs three.js
+    # read what texkit tree and texkit forest write
+    want has_command blender blender python3-numpy
+    want has_command godot3-server godot3-server
     # compilers for other machines and what runs their programs, for tests/wide/machines.sh
     want has_command s390x-linux-gnu-gcc gcc-s390x-linux-gnu libc6-dev-s390x-cross
     want has_command aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu libc6-dev-arm64-cross

@@ -7,6 +7,9 @@
 #            inverse bind matrices, the welded bark (see obj), the clip: keys without jumps, the last
 #            like the first, vertices finite and within reach at several times
 #   forest   a GLB of copies: instanced nodes, their attributes
+#   variants a GLB of plain nodes: no extension, every mesh in use, each bark one surface, the nodes
+#            upright; expect=FILE: names, boxes and triangles of the nodes, for other programs to compare
+#   placed   FILE is what 'assimp export x.glb y.assjson' made of such nodes; expect=JSON as above
 #   obj      an OBJ: the bark is one surface, manifold, oriented, open at the root rim or nowhere
 #   assimp   FILE is what 'assimp export x.glb y.assjson' made; expect=JSON names what 'skin' wrote
 # NAME=VALUE asks for more: joints, keys, seconds, components, rims (border loops of the bark), trees,
@@ -309,6 +312,87 @@ def check_forest(path, want):
             "materials": len(g["materials"]), "images": len(g.get("images", []))}
 
 
+# ---- a forest of plain nodes
+
+def box_of(points):
+    return [[min(p[k] for p in points) for k in range(3)], [max(p[k] for p in points) for k in range(3)]]
+
+
+def check_variants(path, want):
+    glb = Glb(path)
+    g = glb.json
+    need(not {"extensionsUsed", "extensionsRequired", "skins", "animations"} & set(g), "more than nodes")
+    need(g["scenes"][0]["nodes"] == list(range(len(g["nodes"]))), "nodes that the scene does not show")
+    points, triangles, own_rims = [], [], want.pop("rims", 1)
+    for m in g["meshes"]:
+        points.append([])
+        triangles.append(0)
+        for number, p in enumerate(m["primitives"]):
+            glb.primitive(p)
+            positions = glb.values(p["attributes"]["POSITION"])
+            indices = [i for i, in glb.values(p["indices"])]
+            points[-1] += positions
+            triangles[-1] += len(indices) // 3
+            leaves = g["materials"][p["material"]].get("alphaMode") == "MASK"
+            need(leaves == (number == 1), "which primitive is leaves")
+            if number == 0:
+                ids = {}
+                places = [ids.setdefault(x, len(ids)) for x in positions]
+                audit([tuple(places[i] for i in indices[t:t + 3]) for t in range(0, len(indices), 3)],
+                      {"rims": own_rims})
+        low, high = box_of(points[-1])
+        need(abs(low[1]) < 0.1 * high[1] and low[0] < 0 < high[0], "a variant that is not at the origin")
+    nodes, used = [], [0] * len(g["meshes"])
+    for n in g["nodes"]:
+        need(set(n) == {"name", "mesh", "translation", "rotation", "scale"}, "fields of a node")
+        q, s = n["rotation"], n["scale"]
+        need(abs(sum(x * x for x in q) - 1) < 1e-5 and q[0] == q[2] == 0, "a tree that leans")
+        need(s[0] == s[1] == s[2] and 0.7 < s[0] < 1.3 and n["translation"][1] == 0, "a scale or height")
+        used[n["mesh"]] += 1
+        m = matrix(n["translation"], q, s)
+        nodes.append({"name": n["name"], "triangles": triangles[n["mesh"]],
+                      "box": box_of([apply(m, p) for p in points[n["mesh"]]])})
+        need(n["name"].startswith(g["meshes"][n["mesh"]]["name"] + "-"), "name of a node")
+    need(min(used) > 0 and max(used) <= 1.5 * min(used) + 1, "variants are in use %s times" % used)
+    need(len(set(n["name"] for n in nodes)) == len(nodes), "two nodes of one name")
+    need(len(set(tuple(n["translation"]) for n in g["nodes"])) == len(nodes), "two trees in one place")
+    turns = [n["mesh"] for n in sorted(g["nodes"], key=lambda n: n["translation"])]
+    need(len(set(turns)) == 1 or turns != sorted(turns), "variants in rows")
+    extras = g["scenes"][0]["extras"]
+    need(extras["trees"] == len(nodes), "trees in the extras")
+    if "expect" in want:
+        with open(want.pop("expect"), "w") as f:
+            json.dump({"placed": nodes}, f)
+    return {"nodes": len(nodes), "variants": len(g["meshes"]), "materials": len(g["materials"]),
+            "images": len(g.get("images", [])), "pieces": extras["pieces"],
+            "triangles": sum(n["triangles"] for n in nodes)}
+
+
+def check_placed(path, want):
+    with open(path) as f:
+        scene = json.load(f)
+    with open(want.pop("expect")) as f:
+        expect = {n["name"]: n for n in json.load(f)["placed"]}
+    stack, found = [(scene["rootnode"], ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0)))], 0
+    while stack:
+        node, above = stack.pop()
+        m = node["transformation"]
+        world = product(above, tuple(tuple(m[4 * r:4 * r + 4]) for r in range(3)))
+        stack += [(c, world) for c in node.get("children", [])]
+        if node["name"] not in expect:
+            continue
+        found += 1
+        wanted = expect[node["name"]]
+        meshes = [scene["meshes"][i] for i in node["meshes"]]
+        need(sum(len(m["faces"]) for m in meshes) == wanted["triangles"], "triangles of " + node["name"])
+        box = box_of([apply(world, m["vertices"][i:i + 3]) for m in meshes
+                      for i in range(0, len(m["vertices"]), 3)])
+        far = max(distance(a, b) for a, b in zip(box, wanted["box"]))
+        need(far < 1e-4 * max(wanted["box"][1]), "%s is %g away" % (node["name"], far))
+    need(found == len(expect), "%d nodes of %d" % (found, len(expect)))
+    return {}
+
+
 # ---- OBJ
 
 def check_obj(path, want):
@@ -392,7 +476,8 @@ def check_assimp(path, want):
 def main():
     need(len(sys.argv) > 2, "KIND FILE [NAME=VALUE...]")
     want = dict(a.split("=", 1) for a in sys.argv[3:])
-    kinds = {"skin": check_skin, "forest": check_forest, "obj": check_obj, "assimp": check_assimp}
+    kinds = {"skin": check_skin, "forest": check_forest, "obj": check_obj, "assimp": check_assimp,
+             "variants": check_variants, "placed": check_placed}
     figures = kinds[sys.argv[1]](sys.argv[2], want)
     for name, value in figures.items():
         print("%s=%s" % (name, value))

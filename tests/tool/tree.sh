@@ -144,6 +144,79 @@ keep many.glb many.json
 
 rm -f ./*.glb ./*.obj ./*.ply
 
+# ---- forests of plain nodes
+small_forest="forest --count 14 --pieces 60 --sheet 128"
+check "--variants" run 0 $small_forest -o v.glb --species oak,birch --variants 4 --stats stats.json
+check "are plain nodes of meshes" $check_tree variants v.glb nodes=14 variants=4 materials=4 images=4 \
+    expect=variants.json triangles="$(figure triangles)" pieces="$(figure pieces)"
+check "tells how many" grep -q '^v.glb: 14 trees, 4 different ones, ' out.log
+keep v.glb variants.json
+mv "$glbs/v.glb" "$glbs/variants.glb"
+check "of one species, closed below" run 0 $small_forest -o one.glb --variants 1 --bare --capped --level 2
+check "are one mesh" $check_tree variants one.glb nodes=14 variants=1 materials=1 rims=0
+check "more than there are trees" run 0 $small_forest -o all.glb --variants 20 --bare --species oak,dead
+check "are trees that all differ" $check_tree variants all.glb nodes=14 variants=14 materials=2
+check "the tree of the same seed" run 0 tree -o tree.glb --pieces 60 --sheet 128 --seed 7
+check "is the first variant" run 0 $small_forest -o seven.glb --variants 2 --seed 7
+check "vertex by vertex" /usr/bin/python3 -c "
+import sys
+sys.path.insert(0, '$root/tests/tool')
+from check_glb import Glb
+a, b = Glb('tree.glb'), Glb('seven.glb')
+for k in range(2):
+    p, q = (g.json['meshes'][0]['primitives'][k]['attributes']['POSITION'] for g in (a, b))
+    assert a.values(p) == b.values(q)"
+for threads in 1 3; do
+    check "$threads threads" run 0 $small_forest -o v$threads.glb --species oak,birch --variants 4 --threads $threads
+    check "make the same file" cmp v.glb v$threads.glb
+done
+refuses 2 "--variants goes with" $small_forest -o n.obj --variants 2
+refuses 2 "at least 2" $small_forest -o n.glb --variants 1 --species oak,birch
+refuses 2 "--variants" $small_forest -o n.glb --variants 0
+
+# ---- as other programs read them
+programs=$tmp/programs
+mkdir -p "$programs/home" && cp "$glbs"/variants.* "$glbs"/posed.* "$glbs"/willow.* "$programs/"
+cd "$programs" || exit 1
+if has assimp; then
+    check "assimp reads the nodes" assimp export variants.glb variants.assimp.json -fassjson
+    check "as we do" $check_tree placed variants.assimp.json expect=variants.json
+else
+    echo "ok - assimp reads the nodes # SKIP no assimp here"
+fi
+# reads PROGRAM: its log says so of each of the three
+reads() { grep -A1 'ok - ' read.log; [ "$(grep -c "^ok - $1 reads" read.log)" = 3 ]; }
+if has blender; then
+    blender --background --python-exit-code 1 --python "$root/tests/tool/load_blender.py" -- \
+        variants.glb posed.glb willow.glb >read.log 2>&1
+    check "Blender reads nodes, skins and clips as we do" reads Blender
+else
+    echo "ok - Blender reads nodes, skins and clips # SKIP no blender here"
+fi
+# its editor imports, which some builds of it do not end with, and a script looks at what came out
+godot_reads() {
+    cp "$root/tests/tool/load_godot.gd" . && echo 'config_version=4' >project.godot || return 1
+    HOME=$programs/home godot3-server --path . --editor --quit >read.log 2>&1 &
+    child=$!
+    tenths=0
+    while [ "$(ls .import/*.md5 2>/dev/null | wc -l)" -lt 3 ] && [ $tenths -lt 600 ]; do
+        sleep 0.1
+        tenths=$((tenths + 1))
+    done
+    sleep 0.5
+    kill $child 2>/dev/null
+    wait $child 2>/dev/null
+    HOME=$programs/home timeout 60 godot3-server --path . -s load_godot.gd >read.log 2>&1
+    reads Godot
+}
+if has godot3-server; then
+    check "Godot reads nodes, skins and clips as we do" godot_reads
+else
+    echo "ok - Godot reads nodes, skins and clips # SKIP no godot3-server here"
+fi
+cd "$tmp" || exit 1
+rm -f ./*.glb
+
 # ---- the same bytes
 for threads in 1 2 5; do
     check "$threads threads" run 0 $small -o t$threads.glb --wind 5 --seconds 1 --threads $threads

@@ -235,6 +235,40 @@ static void test_seeds(void **state) {
     treepieces_forest_free(f);
 }
 
+/* The places of a forest can be had without it, and make the same one. */
+static void test_scatter(void **state) {
+    (void)state;
+    treepieces_species both[2] = {oak, oak};
+    treepieces_place places[30], before[30];
+    both[1].orders[0].length *= 2;
+    txm_env env = tk_env(NULL, NULL);
+    for (int count = 1; count <= 30; count += 29) {
+        treepieces_forest_desc d = describe(count, 60);
+        d.species = both;
+        d.species_count = 2;
+        treepieces_forest *f = grow(&d);
+        assert_int_equal(treepieces_scatter(&d, &env, places), TXM_OK);
+        for (int i = 0; i < count; i++) {
+            assert_memory_equal(places[i].position, f->trees[i].position, sizeof places[i].position);
+            assert_true(places[i].turn == f->trees[i].turn);
+            assert_int_equal(places[i].species, f->trees[i].species);
+        }
+        d.places = places;
+        treepieces_forest *same = grow(&d);
+        for (int i = 0; i < count; i++) assert_true(hash_tree(f, i) == hash_tree(same, i));
+        assert_int_equal(treepieces_scatter(&d, &env, before), TXM_OK);
+        assert_memory_equal(before, places, (size_t)count * sizeof *places);
+        treepieces_forest_free(same);
+        treepieces_forest_free(f);
+    }
+    treepieces_forest_desc d = describe(30, 60);
+    assert_int_equal(treepieces_scatter(&d, &env, NULL), TXM_BAD_ARGUMENT);
+    assert_int_equal(treepieces_scatter(NULL, &env, places), TXM_BAD_ARGUMENT);
+    d.spacing = -1;
+    assert_int_equal(treepieces_scatter(&d, &env, places), TXM_BAD_ARGUMENT);
+    assert_memory_equal(before, places, sizeof places);
+}
+
 /* With fewer pieces: no more than the limit, all ends closed, the thick parts still there. */
 static void test_budget(void **state) {
     (void)state;
@@ -577,7 +611,7 @@ int main(void) {
         cmocka_unit_test(test_bones),     cmocka_unit_test(test_wind),
         cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
         cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
-        cmocka_unit_test(test_memory),
+        cmocka_unit_test(test_memory),    cmocka_unit_test(test_scatter),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -39,8 +39,12 @@ static const cli_manual forest_manual = {
     "  .ply  the same with colors, without pictures; .stl, without colors as well\n"
     "In glTF instances cannot have skeletons: the pieces in a .glb are rigid and overlap a\n"
     "little where a branch bends. 'texkit tree' writes one tree that can move. All\n"
-    "instances of a piece show the same bark tiles.\n",
+    "instances of a piece show the same bark tiles.\n"
+    "--variants K is for programs without that extension: the .glb holds K different trees as\n"
+    "meshes, and a plain node for each of the N trees. The first of the K is the tree that\n"
+    "'texkit tree' makes of the same --seed, the next that of the next seed, and so on.\n",
     "  texkit forest --count 1000 -o forest.glb --species oak,birch,spruce\n"
+    "  texkit forest --count 500 -o wood.glb --species beech,oak --variants 6 --pieces 300\n"
     "  texkit forest --count 20 -o grove.obj --species poplar --spacing 6 --pieces 200\n",
     0, NULL, 0, "take fewer --pieces or trees", ".glb"};
 
@@ -134,6 +138,11 @@ typedef struct built {
     treepieces_mesh *bark, *leaves; /* of a tree with a rig, whose meshes are views of these */
     tree_rig rig;
     tree_copies copies;
+    tree_places places;
+    mesh_object objects[MAX_VARIANTS];
+    mesh_part variant_parts[MAX_VARIANTS][2];
+    mesh_data *variants; /* wood and foliage of each */
+    char names[MAX_VARIANTS][TREEPIECES_MAX_NAME + 8];
     char *extras;
 } built;
 
@@ -151,6 +160,9 @@ static void free_built(built *b) {
     }
     treepieces_mesh_free(b->bark);
     treepieces_mesh_free(b->leaves);
+    for (int k = 0; k < 2 * MAX_VARIANTS && b->variants; k++) mesh_free(&b->variants[k]);
+    free(b->variants);
+    tree_free_places(&b->places);
     tree_free_rig(&b->rig);
     tree_free_copies(&b->copies);
     cJSON_free(b->extras);
@@ -219,6 +231,45 @@ static int build_copies(tree_job *j, const float tint[3], built *b) {
     return status;
 }
 
+/* One of the different trees, as a mesh in the places where it stands. */
+static int build_variant(tree_job *j, int k, built *b) {
+    treepieces_mesh *bark = NULL, *leaves = NULL;
+    const int species = k % j->species_count, one = tree_has_one_bark(j) ? 0 : species;
+    const size_t first = b->places.first[k];
+    mesh_object *o = &b->objects[b->scene.object_count];
+    int status = bake_tree(j, k, j->posed, &bark, &leaves);
+    if (!status) status = append(j, bark, NULL, &b->variants[2 * k]);
+    if (!status && leaves) status = append(j, leaves, NULL, &b->variants[2 * k + 1]);
+    snprintf(b->names[k], sizeof b->names[k], "%s-%d", j->species[species].name, k + 1);
+    o->name = b->names[k];
+    o->parts = b->variant_parts[k];
+    o->part_count = leaves ? 2 : 1;
+    b->variant_parts[k][0].mesh = &b->variants[2 * k];
+    b->variant_parts[k][0].material = &j->bark_materials[one];
+    b->variant_parts[k][1].mesh = &b->variants[2 * k + 1];
+    b->variant_parts[k][1].material = &j->leaf_materials[species];
+    o->count = b->places.first[k + 1] - first;
+    o->translations = b->places.translations + 3 * first;
+    o->rotations = b->places.rotations + 4 * first;
+    o->scales = b->places.scales + first;
+    b->scene.object_count++;
+    treepieces_mesh_free(bark);
+    treepieces_mesh_free(leaves);
+    return status;
+}
+
+static int build_variants(tree_job *j, built *b) {
+    int status = tree_make_places(j, &b->places);
+    b->variants = (mesh_data *)new_array(2 * MAX_VARIANTS, sizeof(mesh_data));
+    if (!status && !b->variants) status = fail_memory(&j->run);
+    b->scene.objects = b->objects;
+    for (int k = 0; k < j->variants && !status; k++)
+        if (b->places.first[k + 1] > b->places.first[k]) status = build_variant(j, k, b);
+    cli_figure(&j->run, "variants", b->scene.object_count);
+    cli_figure(&j->run, "nodes", j->count);
+    return status;
+}
+
 /* The extras of a .glb: species, seed, numbers of trees and pieces. */
 static int make_extras(tree_job *j, built *b) {
     const treepieces_forest *f = j->forest;
@@ -229,7 +280,8 @@ static int make_extras(tree_job *j, built *b) {
         cJSON_AddItemToArray(names, cJSON_CreateString(j->species[s].name));
     snprintf(seed, sizeof seed, "%llu", (unsigned long long)j->run.seed);
     cJSON_AddRawToObject(json, "seed", seed); /* a double cannot hold all of them */
-    cJSON_AddNumberToObject(json, "trees", f->tree_count);
+    cJSON_AddNumberToObject(json, "trees", j->count);
+    if (j->variants) cJSON_AddNumberToObject(json, "variants", j->variants);
     cJSON_AddNumberToObject(json, "pieces", f->node_count);
     b->extras = cJSON_PrintUnformatted(json);
     cJSON_Delete(json);
@@ -242,6 +294,9 @@ static size_t count_triangles(const built *b) {
     for (int i = 0; i < b->scene.part_count; i++) sum += b->parts[i].mesh->triangle_count;
     for (int i = 0; i < b->scene.instance_count; i++)
         sum += b->copies.list[i].count * b->copies.list[i].mesh->triangle_count;
+    for (int i = 0; i < b->scene.object_count; i++)
+        for (int k = 0; k < b->objects[i].part_count; k++)
+            sum += b->objects[i].count * b->objects[i].parts[k].mesh->triangle_count;
     return sum;
 }
 
@@ -250,6 +305,9 @@ static size_t count_vertices(const built *b) {
     for (int i = 0; i < b->scene.part_count; i++) sum += b->parts[i].mesh->vertex_count;
     for (int i = 0; i < b->scene.instance_count; i++)
         sum += b->copies.list[i].count * b->copies.list[i].mesh->vertex_count;
+    for (int i = 0; i < b->scene.object_count; i++)
+        for (int k = 0; k < b->objects[i].part_count; k++)
+            sum += b->objects[i].count * b->objects[i].parts[k].mesh->vertex_count;
     return sum;
 }
 
@@ -294,8 +352,9 @@ static int write_output(tree_job *j, built *b) {
 static void print_summary(const tree_job *j, const built *b, size_t triangles) {
     const treepieces_forest *f = j->forest;
     printf("%s: ", j->run.output);
-    if (j->is_forest) printf("%d trees, ", f->tree_count);
+    if (j->is_forest) printf("%d trees, ", j->count);
     else printf("%s, %.1f m high, ", j->species[0].name, (double)f->trees[0].height);
+    if (j->variants) printf("%d different ones, ", b->scene.object_count);
     printf("%lu pieces, %lu triangles", (unsigned long)f->node_count, (unsigned long)triangles);
     if (b->scene.skeleton) printf(", %d joints", b->rig.skeleton.joint_count);
     if (b->rig.skeleton.key_count) printf(", %d keys", b->rig.skeleton.key_count);
@@ -315,6 +374,7 @@ static int grow_trees(tree_job *j, built *b) {
     if (status) return status;
     cli_stage(&j->run, "build");
     if (!tree_is_glb(j)) status = build_baked(j, b);
+    else if (j->variants) status = build_variants(j, b);
     else status = j->is_forest ? build_copies(j, tint, b) : build_rigged(j, b);
     if (!status) status = make_extras(j, b);
     if (status) return status;
@@ -360,11 +420,17 @@ static int run_job(tree_job *j, int needs_glb) {
     if (status) return status;
     if (needs_glb && !tree_is_glb(j))
         return cli_fail(&j->run, CLI_USAGE, "--bones, --seconds and --rate go with an OUT in .glb");
-    if (j->level > 1 && j->is_forest && tree_is_glb(j))
-        return cli_fail(&j->run, CLI_USAGE, "--level does not go with a forest in .glb");
+    if (j->variants && !tree_is_glb(j))
+        return cli_fail(&j->run, CLI_USAGE, "--variants goes with an OUT in .glb");
+    if (j->level > 1 && j->is_forest && tree_is_glb(j) && !j->variants)
+        return cli_fail(&j->run, CLI_USAGE,
+                        "--level does not go with a forest in .glb; add --variants K");
     cli_stage(&j->run, "read");
     status = tree_read_species(j);
     if (status) return status;
+    if (j->variants && j->variants < j->species_count)
+        return cli_fail(&j->run, CLI_USAGE, "--variants: at least %d, one for each species",
+                        j->species_count);
     if (!strcmp(j->extension, ".txt")) return write_species(j);
     status = name_files(j);
     if (status) return status;
@@ -429,6 +495,8 @@ static int run_forest(int argc, char **argv) {
          &j->species_list, 0, 0},
         {CLI_TEXT, "--spacing", "M", "metres between trees, 0.1 to 1000; default: by their height",
          &spacing, 0, 0},
+        {CLI_INT, "--variants", "K", ".glb: so many different trees, 1 to 256, as meshes of plain nodes",
+         &j->variants, 1, MAX_VARIANTS},
         {CLI_INT, "--pieces", "N", "maximum per tree, 8 to 65535; default 600", &j->pieces, 8,
          65535},
         {CLI_TILES, "--tiles", "DIR", "bark: a set of 'texkit tiles --kind frame'", &j->tiles, 0, 0},
@@ -436,9 +504,9 @@ static int run_forest(int argc, char **argv) {
         {CLI_INT, "--sheet", "PIXELS", "width of the bark's picture, 128 to 8192; default 512",
          &j->sheet, 128, 8192},
         {CLI_FLAG, "--bare", NULL, "without leaves", &j->bare, 0, 0},
-        {CLI_INT, "--level", "N", ".obj, .ply: divide each side of the quads by N, 1 to 16; default 1",
+        {CLI_INT, "--level", "N", ".obj, .ply, variants: divide each side of the quads by N, 1 to 16; default 1",
          &j->level, 1, MAX_LEVEL},
-        {CLI_FLAG, "--capped", NULL, ".obj, .ply: close the feet of the trunks as well", &j->capped,
+        {CLI_FLAG, "--capped", NULL, ".obj, .ply, variants: close the feet of the trunks as well", &j->capped,
          0, 0},
         {CLI_TEXT, "--wind", "SPEED",
          "bend as in wind of this speed, metres per second, up to 50; default 0", &wind, 0, 0},

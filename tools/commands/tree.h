@@ -2,8 +2,9 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    tree_job.c reads the species, grows and poses. Above it are tree_looks.c, the pictures of bark
-   and leaves; tree_rig.c, the skeleton and its animation; and tree_copies.c, the instances of a
-   forest. At the top tree.c bakes, writes and holds the commands. Calls only run downward.      */
+   and leaves; tree_rig.c, the skeleton and its animation; tree_copies.c, the instances of a forest;
+   and tree_variants.c, where its trees stand if they are a few different ones. At the top tree.c
+   bakes, writes and holds the commands. Calls only run downward.                                */
 #ifndef TREE_H
 #define TREE_H
 
@@ -13,6 +14,7 @@
 
 enum {
     MAX_SPECIES = 8, /* of a forest                                                         */
+    MAX_VARIANTS = 256, /* different trees of a forest of plain nodes                       */
     CLOUDS = 3,      /* different leaf clouds of a forest of one species                    */
     BARK_TILES = 8,  /* drawn if the user gives none                                        */
     WARM_UP = 300    /* tenths of a second until the swaying no longer depends on its start */
@@ -33,7 +35,7 @@ typedef struct tree_job {
 
     /* options */
     const char *species_list, *tiles, *leaf;
-    int count, pieces, bare, level, capped, bones, rate, sheet;
+    int count, pieces, bare, level, capped, bones, rate, sheet, variants;
     int is_forest;
     double wind, seconds, pose, spacing;
 
@@ -64,7 +66,11 @@ int tree_is_bare(const tree_job *j);
 /* Read all species of --species. */
 int tree_read_species(tree_job *j);
 
-/* Grow the trees and compute their bones. */
+/* All trees of the forest, on the grid. */
+treepieces_forest_desc tree_forest_desc(const tree_job *j);
+
+/* Grow the trees and compute their bones. With --variants these alone grow, at the origin: number k is
+   of species k mod species_count, and the tree of seed --seed + k. */
 int tree_grow(tree_job *j);
 
 /* The steady and the gusty part of --wind. */
@@ -116,5 +122,16 @@ typedef struct tree_copies {
 /* tint: sRGB 0..1, the color that the bark's picture was drawn with */
 int tree_make_copies(tree_job *j, const float tint[3], tree_copies *copies);
 void tree_free_copies(tree_copies *copies);
+
+/* ---- tree_variants.c ---- */
+
+/* Where the trees of a forest of variants stand, variant after variant. */
+typedef struct tree_places {
+    size_t first[MAX_VARIANTS + 1]; /* places of variant k: first[k] .. first[k + 1] - 1 */
+    float *translations, *rotations, *scales; /* as in mesh_object */
+} tree_places;
+
+int tree_make_places(tree_job *j, tree_places *places);
+void tree_free_places(tree_places *places);
 
 #endif /* TREE_H */

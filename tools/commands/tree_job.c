@@ -85,18 +85,36 @@ treepieces_wind tree_wind(const tree_job *j) {
     return wind;
 }
 
-static int grow(tree_job *j) {
-    const treepieces_place place = {{0, 0, 0}, 0, 1, 0, j->run.seed};
+treepieces_forest_desc tree_forest_desc(const tree_job *j) {
     treepieces_forest_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.kit = j->kit;
     desc.species = j->species;
     desc.species_count = j->species_count;
-    desc.places = j->is_forest ? NULL : &place;
     desc.tree_count = j->count;
     desc.spacing = (float)j->spacing;
     desc.max_pieces = j->pieces;
     desc.seed = j->run.seed;
+    return desc;
+}
+
+/* One tree of --seed, or of this and the following seeds and of all species in turn, at the origin. */
+static void place_at_origin(const tree_job *j, treepieces_place *places, int count) {
+    for (int i = 0; i < count; i++) {
+        places[i].scale = 1;
+        places[i].species = i % j->species_count;
+        places[i].seed = j->run.seed + (uint64_t)i;
+    }
+}
+
+static int grow(tree_job *j) {
+    treepieces_place places[MAX_VARIANTS] = {{{0, 0, 0}, 0, 0, 0, 0}};
+    treepieces_forest_desc desc = tree_forest_desc(j);
+    if (!j->is_forest || j->variants) {
+        desc.places = places;
+        desc.tree_count = j->is_forest ? j->variants : 1;
+        place_at_origin(j, places, desc.tree_count);
+    }
     return check_result(&j->run, treepieces_forest_make(&desc, &j->run.env, &j->forest),
                         j->species[0].name);
 }
@@ -130,7 +148,7 @@ static void grown_figures(tree_job *j) {
     float height = 0;
     for (int t = 0; t < f->tree_count; t++)
         if (f->trees[t].height > height) height = f->trees[t].height;
-    cli_figure(&j->run, "trees", f->tree_count);
+    cli_figure(&j->run, "trees", j->count);
     cli_figure(&j->run, "pieces", f->node_count);
     cli_figure(&j->run, "clusters", f->cluster_count);
     cli_figure(&j->run, "height", (double)height);

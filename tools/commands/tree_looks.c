@@ -199,7 +199,7 @@ static void brightest_bark(const tree_job *j, float color[3]) {
 }
 
 int tree_has_one_bark(const tree_job *j) {
-    return j->tiles || tree_is_glb(j);
+    return j->tiles || (tree_is_glb(j) && !j->variants);
 }
 
 int tree_has_bark(const tree_job *j, int s) {

@@ -2,6 +2,8 @@
    SPDX-License-Identifier: MIT OR Unlicense */
 #include "mesh_file.h"
 
+#include <stdio.h>
+
 enum { GL_UNSIGNED_SHORT = 5123, GL_UNSIGNED_INT = 5125, GL_FLOAT = 5126 };
 enum { NORMALIZED = 1 << 16 }; /* with a component type: 0..65535 means 0..1 */
 enum { GL_ARRAY = 34962, GL_ELEMENTS = 34963 };
@@ -222,6 +224,18 @@ static void glb_close_mesh(glb *g) {
     sink_print(&g->meshes, "]}");
 }
 
+/* A string of JSON. */
+static void print_string(sink *s, const char *from) {
+    sink_put(s, "\"", 1);
+    for (; *from; from++) {
+        const unsigned char c = (unsigned char)*from;
+        if (c == '"' || c == '\\') sink_print(s, "\\%c", c);
+        else if (c < 32) sink_print(s, "\\u%04x", c);
+        else sink_put(s, from, 1);
+    }
+    sink_put(s, "\"", 1);
+}
+
 /* Begin a node; what follows is more of its fields and the closing brace. */
 static void glb_node(glb *g, const char *name) {
     sink_print(&g->nodes, "%s{", g->node_count++ ? "," : "");
@@ -272,6 +286,36 @@ static int glb_instances(glb *g, const mesh_instances *t) {
                    glb_accessor(g, start, 0, GL_FLOAT, t->count, "VEC3", NULL));
     }
     sink_print(s, "}}}}");
+    return 1;
+}
+
+/* A mesh and the plain nodes that refer to it. */
+static int glb_object(glb *g, const mesh_object *o) {
+    const double size = mesh_place_scale(g->place);
+    sink *s = &g->nodes;
+    char name[64];
+    glb_open_mesh(g);
+    for (int i = 0; i < o->part_count; i++) {
+        if (i) sink_print(&g->meshes, ",");
+        if (!glb_primitive(g, o->parts[i].mesh, o->parts[i].material)) return 0;
+    }
+    sink_print(&g->meshes, "],\"name\":");
+    print_string(&g->meshes, o->name);
+    sink_print(&g->meshes, "}");
+    for (size_t i = 0; i < o->count; i++) {
+        double place[3];
+        for (int k = 0; k < 3; k++)
+            place[k] = mesh_place_out(g->place, o->translations[3 * i + (size_t)k], k);
+        snprintf(name, sizeof name, "%.40s-%lu", o->name, (unsigned long)i + 1);
+        glb_node(g, NULL);
+        sink_print(s, "\"name\":");
+        print_string(s, name);
+        sink_print(s, ",\"mesh\":%d,\"translation\":[%.17g,%.17g,%.17g]", g->mesh_count - 1, place[0],
+                   place[1], place[2]);
+        print_list(s, "rotation", o->rotations + 4 * i, 4);
+        const double scale = size * (double)o->scales[i];
+        sink_print(s, ",\"scale\":[%.9g,%.9g,%.9g]}", scale, scale, scale);
+    }
     return 1;
 }
 
@@ -369,18 +413,6 @@ static void put_png(sink *s, const unsigned char *png, size_t size) {
     }
 }
 
-/* A string of JSON. */
-static void print_string(sink *s, const char *from) {
-    sink_put(s, "\"", 1);
-    for (; *from; from++) {
-        const unsigned char c = (unsigned char)*from;
-        if (c == '"' || c == '\\') sink_print(s, "\\%c", c);
-        else if (c < 32) sink_print(s, "\\u%04x", c);
-        else sink_put(s, from, 1);
-    }
-    sink_put(s, "\"", 1);
-}
-
 /* Does material i have a picture? *first: that of the first material with the same one. */
 static int has_picture(const glb *g, int i, int *first) {
     const mesh_material *m = g->materials[i].material;
@@ -472,7 +504,7 @@ static void print_document(glb *g, const mesh_scene *scene, int instanced, int j
     while (json->bytes.count % 4 && !json->failed) sink_put(json, " ", 1);
 }
 
-/* All surfaces as one mesh, instances, joints: nodes in this order. Returns the first joint's node,
+/* All surfaces as one mesh, instances, objects, joints: nodes in this order. Returns the first joint's node,
    0 if there is none, -1 without memory. */
 static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
     const mesh_skeleton *k = scene->skeleton;
@@ -492,6 +524,8 @@ static int glb_scene(glb *g, const mesh_scene *scene, mesh_material *own) {
     for (int i = 0; i < scene->instance_count; i++) {
         if (scene->instances[i].count && !glb_instances(g, &scene->instances[i])) return -1;
     }
+    for (int i = 0; i < scene->object_count; i++)
+        if (scene->objects[i].count && !glb_object(g, &scene->objects[i])) return -1;
     if (k) {
         joint = g->node_count;
         if (!glb_joints(g, k)) return -1;

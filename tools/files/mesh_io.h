@@ -99,6 +99,17 @@ typedef struct mesh_part {
     const mesh_material *material;
 } mesh_part;
 
+/* An object of some surfaces in many places, each of them a plain node. */
+typedef struct mesh_object {
+    const mesh_part *parts;
+    int part_count;
+    size_t count;              /* of places                                    */
+    const float *translations; /* 3 per place                                  */
+    const float *rotations;    /* 4 per place, unit quaternions x y z w        */
+    const float *scales;       /* 1 per place                                  */
+    const char *name;          /* of the mesh; the nodes add a number          */
+} mesh_object;
+
 /* A joint of a skeleton, placed relative to its parent. */
 typedef struct mesh_joint {
     char name[24];
@@ -128,6 +139,8 @@ typedef struct mesh_scene {
     const char *extras;              /* GLB: a JSON object for the user, or NULL               */
     const mesh_instances *instances; /* each with triangles; GLB only: mesh_bake for the others */
     int instance_count;
+    const mesh_object *objects; /* each with triangles; GLB only                               */
+    int object_count;
     int repeats;              /* GLB: that picture repeats both ways                             */
     const char *texture;      /* OBJ, GLB: name of the picture on the surface, '/' between folders;
                                  NULL = none                                                    */
