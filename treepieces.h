@@ -382,7 +382,7 @@ typedef enum treepieces_rule {
 typedef struct treepieces_place {
     float position[3]; /* metres                                                                  */
     float turn;        /* radians about y                                                         */
-    float scale;       /* 0 = 1                                                                   */
+    float scale;       /* 0.001..1000; 0 = 1                                                      */
     int species;
     uint64_t seed;
 } treepieces_place;
@@ -2835,7 +2835,7 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
    one takes the intended direction. */
 static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3], float ratio,
                           float offset) {
-    const float most = txm_minf((offset - 1.1f) / ratio, 0.68f), cosine = tpc_dot(bud->heading, stem);
+    const float most = txm_clampf((offset - 1.1f) / ratio, 0, 0.68f), cosine = tpc_dot(bud->heading, stem);
     bud->is_aimed = cosine > most;
     if (!bud->is_aimed) return;
     memcpy(bud->aim, bud->heading, sizeof bud->aim);
@@ -3468,7 +3468,7 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
         for (int k = 0; k < 3; k++)
             if (!(fabsf(p->position[k]) <= 1e6f))
                 return txm_fail(env, TXM_BAD_ARGUMENT, "places: a position is beyond 1000 km");
-        if (!(fabsf(p->turn) <= 1e4f) || !(p->scale >= 0 && p->scale <= 1000))
+        if (!(fabsf(p->turn) <= 1e4f) || !(p->scale == 0 || (p->scale >= 1e-3f && p->scale <= 1000)))
             return txm_fail(env, TXM_BAD_ARGUMENT, "places: a turn or scale is out of range");
         if (p->species < 0 || p->species >= d->species_count)
             return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species number is out of range");

@@ -382,7 +382,7 @@ typedef enum treepieces_rule {
 typedef struct treepieces_place {
     float position[3]; /* metres                                                                  */
     float turn;        /* radians about y                                                         */
-    float scale;       /* 0 = 1                                                                   */
+    float scale;       /* 0.001..1000; 0 = 1                                                      */
     int species;
     uint64_t seed;
 } treepieces_place;

@@ -287,7 +287,7 @@ static txm_status tpc_check_forest(const treepieces_forest_desc *d, txm_env *env
         for (int k = 0; k < 3; k++)
             if (!(fabsf(p->position[k]) <= 1e6f))
                 return txm_fail(env, TXM_BAD_ARGUMENT, "places: a position is beyond 1000 km");
-        if (!(fabsf(p->turn) <= 1e4f) || !(p->scale >= 0 && p->scale <= 1000))
+        if (!(fabsf(p->turn) <= 1e4f) || !(p->scale == 0 || (p->scale >= 1e-3f && p->scale <= 1000)))
             return txm_fail(env, TXM_BAD_ARGUMENT, "places: a turn or scale is out of range");
         if (p->species < 0 || p->species >= d->species_count)
             return txm_fail(env, TXM_BAD_ARGUMENT, "places: a species number is out of range");

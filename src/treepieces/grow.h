@@ -359,7 +359,7 @@ static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepie
    one takes the intended direction. */
 static void tpc_stand_off(tpc_bud *bud, const float stem[3], const float out[3], float ratio,
                           float offset) {
-    const float most = txm_minf((offset - 1.1f) / ratio, 0.68f), cosine = tpc_dot(bud->heading, stem);
+    const float most = txm_clampf((offset - 1.1f) / ratio, 0, 0.68f), cosine = tpc_dot(bud->heading, stem);
     bud->is_aimed = cosine > most;
     if (!bud->is_aimed) return;
     memcpy(bud->aim, bud->heading, sizeof bud->aim);

@@ -511,7 +511,7 @@ static void test_arguments(void **state) {
     (void)state;
     treepieces_forest *f = NULL;
     txm_env env = tk_env(NULL, NULL);
-    for (int i = 0; i < 12; i++) {
+    for (int i = 0; i < 14; i++) {
         treepieces_place place;
         treepieces_forest_desc d = describe(1, 100);
         memset(&place, 0, sizeof place);
@@ -527,6 +527,8 @@ static void test_arguments(void **state) {
         case 8: place.position[1] = (float)NAN; break;
         case 9: place.scale = -1; break;
         case 10: place.species = 1; break;
+        case 11: place.scale = 1e-30f; break; /* bones would not be finite */
+        case 12: place.scale = 1001; break;
         default: place.turn = (float)INFINITY; break;
         }
         if (i >= 8) d.places = &place;

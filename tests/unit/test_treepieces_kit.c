@@ -163,6 +163,44 @@ static void own_pieces_grow(void **state) {
     treepieces_kit_free(kit);
 }
 
+/* a rule that grows thin branches */
+static void choose_branches(void *user, const treepieces_site *site, txm_rng *rng,
+                            treepieces_choice *choice) {
+    (void)user;
+    (void)rng;
+    for (int k = 0; k < 3; k++) assert_true(txm_is_finite((double)site->direction[k]));
+    choice->type = site->depth < 6 ? TREEPIECES_BUILTIN : TREEPIECES_TIP;
+    choice->ratios[0] = 0.9f;
+    choice->ratios[1] = 0.05f;
+}
+
+/* A branch whose rim lies near the axis of its stem, where it cannot keep clear of that. */
+static void own_branches_grow_from_within(void **state) {
+    (void)state;
+    static own_piece own;
+    treepieces_kit *kit = NULL;
+    treepieces_forest *forest = NULL;
+    treepieces_species species;
+    treepieces_forest_desc desc;
+    copy_builtin(&own, TREEPIECES_SIDE);
+    float *to = own.piece.building[1].translation, move[3] = {-0.7f * to[0], 0, -0.7f * to[2]};
+    for (int k = 0; k < 3; k++) {
+        to[k] += move[k];
+        for (int j = 0; j < 6; j++) own.vertices[own.piece.leaf_rims[1][j]].position[k] += move[k];
+    }
+    assert_int_equal(treepieces_kit_make(&own.piece, 1, NULL, &kit), TXM_OK);
+    assert_int_equal(treepieces_preset("oak", NULL, &species), TXM_OK);
+    memset(&desc, 0, sizeof desc);
+    desc.kit = kit;
+    desc.species = &species;
+    desc.species_count = desc.tree_count = 1;
+    desc.own_rule = choose_branches;
+    assert_int_equal(treepieces_forest_make(&desc, NULL, &forest), TXM_OK);
+    assert_true(forest->batches[TREEPIECES_BUILTIN].count > 20);
+    treepieces_forest_free(forest);
+    treepieces_kit_free(kit);
+}
+
 /* Faults of a tube, and what the message must name. */
 typedef struct piece_fault {
     void (*spoil)(own_piece *own);
@@ -429,6 +467,7 @@ int main(void) {
         cmocka_unit_test(a_forest_refuses_a_bad_species),
         cmocka_unit_test(own_pieces_are_taken),
         cmocka_unit_test(own_pieces_grow),
+        cmocka_unit_test(own_branches_grow_from_within),
         cmocka_unit_test(every_fault_of_a_piece_is_named),
         cmocka_unit_test(a_kit_checks_its_arguments),
         cmocka_unit_test(kits_and_species_survive_failing_memory),

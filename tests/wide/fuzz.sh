@@ -41,6 +41,7 @@ fuzz texmath 20000 "${SEED:-1}"
 fuzz texinpaint 100 "${SEED:-1}"
 fuzz trimesh_relax 250 "${SEED:-1}"
 fuzz trimesh_cover 1000 "${SEED:-1}"
+fuzz treepieces 12000 "${SEED:-1}"
 
 # libFuzzer follows what the loader does with its bytes
 if [ "$FULL" = 1 ] && has clang; then
