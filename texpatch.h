@@ -3120,25 +3120,14 @@ static void txp_polish_band(void *context, int index) {
     }
 }
 
-/* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
+/* ---- fields that jump at seams ------------------------------------------------------------ */
 
 enum {
-    TXP_MAX_BEND = 4,    /* pixels by which a piece is bent at most                              */
-    TXP_PROBE = 8,       /* pixels a side that are compared at a seam                            */
     TXP_SWEEPS = 12,     /* of the relaxation                                                    */
-    TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
     TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
     TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
-    TXP_JUMP_UNIT = 64,  /* jumps are stored in 1 / 64                                           */
-
-    TXP_PULL_SEAM = 13,  /* of 255: pull between two pieces                                      */
-    TXP_PULL_FITS = 77,  /* the same if no shift would make them fit better                      */
-    TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
-    TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
+    TXP_JUMP_UNIT = 64   /* jumps are stored in 1 / 64                                           */
 };
-#define TXP_FAINT 0.125 /* share of alpha below which the colour of a seam says too little     */
-#define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
-#define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
 
 /* A field over the canvas with given jumps between neighbouring pixels: the minimum of
 
@@ -3238,6 +3227,39 @@ static void txp_relax_field(txp_field *f, txm_env *env) {
     for (f->colour = 0; f->colour < 2; f->colour++)
         txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
 }
+
+/* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
+   tells whether there was no memory. */
+static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
+                           txm_arena *memory, txm_arena *scratch) {
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    f->width = c->width;
+    f->height = c->height;
+    f->wrap = c->wrap;
+    f->fixed = c->fixed;
+    f->lanes = lanes;
+    for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
+    f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
+    f->jump = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
+    f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
+    f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
+    f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
+    f->active = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
+}
+
+/* ---- seams: where lines should meet, and steps of colour ----------------------------------- */
+
+enum {
+    TXP_MAX_BEND = 4,    /* pixels by which a piece is bent at most                              */
+    TXP_PROBE = 8,       /* pixels a side that are compared at a seam                            */
+    TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
+
+    TXP_PULL_SEAM = 13,  /* of 255: pull between two pieces                                      */
+    TXP_PULL_FITS = 77,  /* the same if no shift would make them fit better                      */
+    TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
+    TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
+};
+#define TXP_FAINT 0.125 /* share of alpha below which the colour of a seam says too little     */
 
 /* A measured seam between two pieces. Its key is the difference of their offsets. */
 typedef struct txp_seam {
@@ -3399,25 +3421,6 @@ static void txp_measure_band(void *context, int lane) {
             }
         }
     }
-}
-
-/* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
-   tells whether there was no memory. */
-static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
-                           txm_arena *memory, txm_arena *scratch) {
-    const size_t pixels = (size_t)c->width * (size_t)c->height;
-    f->width = c->width;
-    f->height = c->height;
-    f->wrap = c->wrap;
-    f->fixed = c->fixed;
-    f->lanes = lanes;
-    for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
-    f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
-    f->jump = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
-    f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
-    f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
-    f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
-    f->active = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
 }
 
 /* ---- jobs --------------------------------------------------------------------------------- */
@@ -3877,6 +3880,72 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
     return TXM_OK;
 }
 
+/* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
+
+#define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
+#define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
+
+/* Compute the two fields of a canvas. */
+static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
+                             float **toned, txm_env *env) {
+    const txp_source *s = job->source;
+    const txp_origins *given = &job->given.from;
+    const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    txm_arena scratch;
+    txp_field bend, tone;
+    txp_seams seams;
+    txm_status status = TXM_OK;
+    memset(&bend, 0, sizeof bend);
+    memset(&tone, 0, sizeof tone);
+    txm_arena_init(&scratch, env);
+    txp_field_make(&bend, c, 2, TXP_BEND_SCREEN, memory, &scratch);
+    txp_field_make(&tone, c, lanes, TXP_TONE_SCREEN, memory, &scratch);
+    if (memory->failed || scratch.failed) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
+        goto done;
+    }
+    for (size_t i = 0; i < pixels && given->bend; i++) {
+        if (!job->given.fixed[i]) continue;
+        const float *b = given->bend + 2 * i, *v = given->tone + (size_t)lanes * i;
+        const int x = (int)(i % (size_t)c->width), y = (int)(i / (size_t)c->width);
+        float most = 0;
+        memcpy(bend.value + 2 * i, b, 2 * sizeof(float));
+        memcpy(tone.value + (size_t)lanes * i, v, (size_t)lanes * sizeof(float));
+        for (int k = 0; k < lanes; k++) most = txm_maxf(most, fabsf(v[k]));
+        if (fabsf(b[0]) + fabsf(b[1]) > 0.05f) txp_field_mark(&bend, x, y);
+        if (most > 0.25f) txp_field_mark(&tone, x, y);
+    }
+    seams.source = s;
+    seams.canvas = c;
+    seams.bend = &bend;
+    seams.tone = &tone;
+    /* A band also writes to the first row of the next one: so every second band at a time, and the
+       last one, which may be followed by the first, alone. */
+    for (int turn = 0; turn < 3; turn++) {
+        const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
+        for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
+            const int count = (end - seams.first_band + 1) / 2;
+            status = txp_report(job, env, "blending");
+            if (status != TXM_OK) goto done;
+            txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
+        }
+    }
+    txp_field_spread(&bend);
+    txp_field_spread(&tone);
+    for (int i = 0; i < TXP_SWEEPS; i++) {
+        status = txp_report(job, env, "blending");
+        if (status != TXM_OK) goto done;
+        txp_relax_field(&bend, env);
+        txp_relax_field(&tone, env);
+    }
+    *bent = bend.value;
+    *toned = tone.value;
+done:
+    txm_arena_free(&scratch);
+    return status;
+}
+
 /* ---- beginning, stepping, releasing a job ----------------------------------------------- */
 
 /* A random offset of the lattice. */
@@ -4016,67 +4085,6 @@ no_memory:
     txm_arena_free(&memory);
     txm_arena_free(&source_memory);
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
-}
-
-/* Compute the two fields of a canvas. */
-static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
-                             float **toned, txm_env *env) {
-    const txp_source *s = job->source;
-    const txp_origins *given = &job->given.from;
-    const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
-    const size_t pixels = (size_t)c->width * (size_t)c->height;
-    txm_arena scratch;
-    txp_field bend, tone;
-    txp_seams seams;
-    txm_status status = TXM_OK;
-    memset(&bend, 0, sizeof bend);
-    memset(&tone, 0, sizeof tone);
-    txm_arena_init(&scratch, env);
-    txp_field_make(&bend, c, 2, TXP_BEND_SCREEN, memory, &scratch);
-    txp_field_make(&tone, c, lanes, TXP_TONE_SCREEN, memory, &scratch);
-    if (memory->failed || scratch.failed) {
-        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
-        goto done;
-    }
-    for (size_t i = 0; i < pixels && given->bend; i++) {
-        if (!job->given.fixed[i]) continue;
-        const float *b = given->bend + 2 * i, *v = given->tone + (size_t)lanes * i;
-        const int x = (int)(i % (size_t)c->width), y = (int)(i / (size_t)c->width);
-        float most = 0;
-        memcpy(bend.value + 2 * i, b, 2 * sizeof(float));
-        memcpy(tone.value + (size_t)lanes * i, v, (size_t)lanes * sizeof(float));
-        for (int k = 0; k < lanes; k++) most = txm_maxf(most, fabsf(v[k]));
-        if (fabsf(b[0]) + fabsf(b[1]) > 0.05f) txp_field_mark(&bend, x, y);
-        if (most > 0.25f) txp_field_mark(&tone, x, y);
-    }
-    seams.source = s;
-    seams.canvas = c;
-    seams.bend = &bend;
-    seams.tone = &tone;
-    /* A band also writes to the first row of the next one: so every second band at a time, and the
-       last one, which may be followed by the first, alone. */
-    for (int turn = 0; turn < 3; turn++) {
-        const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
-        for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
-            const int count = (end - seams.first_band + 1) / 2;
-            status = txp_report(job, env, "blending");
-            if (status != TXM_OK) goto done;
-            txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
-        }
-    }
-    txp_field_spread(&bend);
-    txp_field_spread(&tone);
-    for (int i = 0; i < TXP_SWEEPS; i++) {
-        status = txp_report(job, env, "blending");
-        if (status != TXM_OK) goto done;
-        txp_relax_field(&bend, env);
-        txp_relax_field(&tone, env);
-    }
-    *bent = bend.value;
-    *toned = tone.value;
-done:
-    txm_arena_free(&scratch);
-    return status;
 }
 
 /* A step of a job without a part. */

@@ -1,306 +1,73 @@
 #ifndef TEXPATCH_FINISH_H
 #define TEXPATCH_FINISH_H
 
-#include "canvas.h"
+#include "job.h"
+#include "seams.h"
 
 /* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
 
-enum {
-    TXP_MAX_BEND = 4,    /* pixels by which a piece is bent at most                              */
-    TXP_PROBE = 8,       /* pixels a side that are compared at a seam                            */
-    TXP_SWEEPS = 12,     /* of the relaxation                                                    */
-    TXP_SEAM_CACHE = 64, /* measured seams that are remembered                                   */
-    TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
-    TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
-    TXP_JUMP_UNIT = 64,  /* jumps are stored in 1 / 64                                           */
-
-    TXP_PULL_SEAM = 13,  /* of 255: pull between two pieces                                      */
-    TXP_PULL_FITS = 77,  /* the same if no shift would make them fit better                      */
-    TXP_SMALL_STEP = 12, /* gray levels: a step of tone up to here is spread fully               */
-    TXP_LARGE_STEP = 32  /* from here on it is an edge of something and not spread               */
-};
-#define TXP_FAINT 0.125 /* share of alpha below which the colour of a seam says too little     */
 #define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
 #define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
 
-/* A field over the canvas with given jumps between neighbouring pixels: the minimum of
-
-       sum over neighbours of pull |u(q) - u(p) - jump|^2 + screen |u|^2,
-
-   which jumps at seams and fades within 1 / sqrt(screen) pixels.                                */
-typedef struct txp_field {
-    int width, height, wrap, lanes; /* lanes: values per pixel, 2 or a multiple of 4           */
-    float *value;
-    int16_t *jump;    /* lanes per pixel: pull times jump, in 1 / TXP_JUMP_UNIT                 */
-    uint8_t *pull[2]; /* to the right neighbour, to the lower one, in 1 / 255; 255 inside a piece */
-    float scale[4 * 255 + 1]; /* by the sum of the four pulls: 1 / (sum + screen)               */
-    const uint8_t *fixed; /* 1 = value does not change; NULL: it does everywhere               */
-    uint8_t *active; /* of each tile of TXP_TILE x 8 pixels: 2 = it has jumps, 1 = near one    */
-    int tiles;     /* in a row                                                                */
-    int colour;    /* of the pixels that are relaxed now, on a checkerboard                   */
-} txp_field;
-
-static inline void txp_field_mark(const txp_field *f, int x, int y) {
-    f->active[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
-}
-
-/* Activate the tiles within TXP_FADE of marked ones. */
-static void txp_field_spread(const txp_field *f) {
-    const int rows = (f->height + 7) / 8, across = TXP_FADE / TXP_TILE, along = TXP_FADE / 8;
-    for (int j = 0; j < rows; j++) {
-        for (int i = 0; i < f->tiles; i++) {
-            if (f->active[j * f->tiles + i] != 2) continue;
-            for (int v = -along; v <= along; v++) {
-                int y = j + v;
-                if (f->wrap & TEXPATCH_TILE_Y) y = (y + 2 * rows) % rows;
-                if (y < 0 || y >= rows) continue;
-                for (int u = -across; u <= across; u++) {
-                    int x = i + u;
-                    if (f->wrap & TEXPATCH_TILE_X) x = (x + 2 * f->tiles) % f->tiles;
-                    if (x < 0 || x >= f->tiles) continue;
-                    if (!f->active[y * f->tiles + x]) f->active[y * f->tiles + x] = 1;
-                }
-            }
-        }
-    }
-}
-
-static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *next,
-                                   const uint8_t *pull, int lanes) {
-    float *own = f->value + i * (size_t)lanes;
-    const int16_t *jump = f->jump + i * (size_t)lanes;
-    const float scale = f->scale[pull[0] + pull[1] + pull[2] + pull[3]];
-    const float l = pull[0], r = pull[1], u = pull[2], d = pull[3];
-    const float unit = 255.0f / (float)TXP_JUMP_UNIT;
-    const float beyond = 1.6f; /* a variable: where floats are computed in double, so are constants */
-    const float *a = f->value + next[0] * (size_t)lanes, *b = f->value + next[1] * (size_t)lanes;
-    const float *c = f->value + next[2] * (size_t)lanes, *e = f->value + next[3] * (size_t)lanes;
-    for (int k = 0; k < lanes; k++) {
-        const float across = txm_float(txm_float(l * a[k]) + txm_float(r * b[k]));
-        const float along = txm_float(txm_float(u * c[k]) + txm_float(d * e[k]));
-        const float all = txm_float(txm_float(across + along) + txm_float(unit * (float)jump[k]));
-        own[k] = txm_float(own[k] + txm_float(beyond * txm_float(txm_float(all * scale) - own[k])));
-    }
-}
-
-/* The pixels of one colour in 8 rows: successive over-relaxation. */
-static void txp_relax_rows(void *context, int index) {
-    const txp_field *f = (const txp_field *)context;
-    const int w = f->width, h = f->height, lanes = f->lanes;
-    for (int y = 8 * index; y < 8 * index + 8 && y < h; y++) {
-        const int up = y > 0 ? y - 1 : f->wrap & TEXPATCH_TILE_Y ? h - 1 : -1;
-        const int down = y + 1 < h ? y + 1 : f->wrap & TEXPATCH_TILE_Y ? 0 : -1;
-        const uint8_t *active = f->active + (size_t)(y / 8) * (size_t)f->tiles;
-        for (int x = (y + f->colour) % 2; x < w; x += 2) {
-            const size_t i = (size_t)y * (size_t)w + (size_t)x;
-            if (!active[x / TXP_TILE]) {
-                x += TXP_TILE - 2; /* the next tile */
-                continue;
-            }
-            if (f->fixed && f->fixed[i]) continue;
-            const int left = x > 0 ? x - 1 : f->wrap & TEXPATCH_TILE_X ? w - 1 : -1;
-            const int right = x + 1 < w ? x + 1 : f->wrap & TEXPATCH_TILE_X ? 0 : -1;
-            size_t next[4];
-            uint8_t pull[4];
-            next[0] = left < 0 ? i : (size_t)y * (size_t)w + (size_t)left;
-            next[1] = right < 0 ? i : (size_t)y * (size_t)w + (size_t)right;
-            next[2] = up < 0 ? i : (size_t)up * (size_t)w + (size_t)x;
-            next[3] = down < 0 ? i : (size_t)down * (size_t)w + (size_t)x;
-            pull[0] = left < 0 ? 0 : f->pull[0][next[0]];
-            pull[1] = right < 0 ? 0 : f->pull[0][i];
-            pull[2] = up < 0 ? 0 : f->pull[1][next[2]];
-            pull[3] = down < 0 ? 0 : f->pull[1][i];
-            if (lanes == 4) txp_relax_pixel(f, i, next, pull, 4);
-            else if (lanes == 2) txp_relax_pixel(f, i, next, pull, 2);
-            else txp_relax_pixel(f, i, next, pull, lanes);
-        }
-    }
-}
-
-static void txp_relax_field(txp_field *f, txm_env *env) {
-    for (f->colour = 0; f->colour < 2; f->colour++)
-        txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
-}
-
-/* A measured seam between two pieces. Its key is the difference of their offsets. */
-typedef struct txp_seam {
-    int x, y, dx, dy, found, shift[2];
-} txp_seam;
-
-/* The shift of the second piece, up to TXP_MAX_BEND pixels, with which it continues the first best
-   around a pixel. 0: none is clearly better than no shift. */
-static int txp_seam_shift(const txp_source *s, txp_place a, txp_place b, int shift[2]) {
-    const txp_stack *k = &s->stack[0];
-    const int ax = a.x - TXP_PROBE / 2, ay = a.y - TXP_PROBE / 2;
-    const int bx = b.x - TXP_PROBE / 2, by = b.y - TXP_PROBE / 2;
-    shift[0] = shift[1] = 0;
-    if (!txp_fits(s, k, ax, ay, TXP_PROBE, TXP_PROBE) ||
-        !txp_fits(s, k, bx, by, TXP_PROBE, TXP_PROBE))
-        return 0;
-    const uint8_t *target = txp_stack_at(s, k, ax, ay);
-    const uint32_t now = txp_sad(target, k->pitch, txp_stack_at(s, k, bx, by), k->pitch,
-                                 TXP_PROBE * s->bytes, TXP_PROBE, UINT32_MAX);
-    uint32_t best = now / 10 * 7;
-    int found = 0;
-    if (now < TXP_PROBE * TXP_PROBE * 4) return 0;
-    for (int dy = -TXP_MAX_BEND; dy <= TXP_MAX_BEND; dy++) {
-        for (int dx = -TXP_MAX_BEND; dx <= TXP_MAX_BEND; dx++) {
-            if (!txp_fits(s, k, bx + dx, by + dy, TXP_PROBE, TXP_PROBE)) continue;
-            const uint32_t sad = txp_sad(target, k->pitch, txp_stack_at(s, k, bx + dx, by + dy),
-                                         k->pitch, TXP_PROBE * s->bytes, TXP_PROBE, best);
-            if (sad >= best) continue;
-            best = sad;
-            shift[0] = dx;
-            shift[1] = dy;
-            found = 1;
-        }
-    }
-    return found;
-}
-
-/* The same, from the cache for the next pixels of a seam between the same two pieces. */
-static int txp_seam_cached(const txp_source *s, txp_seam *seams, int x, int y, txp_place a,
-                           txp_place b, int shift[2]) {
-    const int dx = a.x - b.x, dy = a.y - b.y;
-    txp_seam *m = &seams[(unsigned)(dx * 31 + dy) % TXP_SEAM_CACHE];
-    if (m->dx != dx || m->dy != dy || abs(m->x - x) + abs(m->y - y) > 3) {
-        m->x = x;
-        m->y = y;
-        m->dx = dx;
-        m->dy = dy;
-        m->found = txp_seam_shift(s, a, b, m->shift);
-    }
-    shift[0] = m->shift[0];
-    shift[1] = m->shift[1];
-    return m->found;
-}
-
-/* The step of colour between 5 x 5 pixels of two pieces, summed over them, for each compared byte.
-   That of a colour is between the means of what shows of both; none where next to nothing shows. */
-static void txp_seam_step(const txp_source *s, const txp_stack *k, txp_place a, txp_place b,
-                          int sum[TEXPATCH_MAX_CHANNELS]) {
-    int of_a[TEXPATCH_MAX_CHANNELS] = {0};
-    for (int v = 0; v < 5; v++) {
-        const uint8_t *pa = txp_stack_at(s, k, a.x, a.y + v);
-        const uint8_t *pb = txp_stack_at(s, k, b.x, b.y + v);
-        for (int u = 0; u < 5; u++, pa += s->bytes, pb += s->bytes) {
-            for (int c = 0; c < s->guide_at; c++) {
-                sum[c] += pa[c] - pb[c];
-                of_a[c] += pa[c];
-            }
-        }
-    }
-    for (int c = 0; c < s->guide_at && s->has_alpha; c++) {
-        const int alpha = s->alpha_at[c];
-        if (alpha < 0) continue;
-        const double all = 25 * s->opaque[c], of_b = of_a[c] - sum[c];
-        const double shown_a = of_a[alpha], shown_b = of_a[alpha] - sum[alpha];
-        if (shown_a >= all && shown_b >= all) continue;
-        if (shown_a < TXP_FAINT * all || shown_b < TXP_FAINT * all) sum[c] = 0;
-        else sum[c] = (int)floor(of_a[c] * all / shown_a - of_b * all / shown_b + 0.5);
-    }
-}
-
-/* Pixel j shall be `jump` above i. */
-static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t lane, int jump) {
-    int16_t *a = f->jump + i * (size_t)f->lanes + lane,
-            *b = f->jump + j * (size_t)f->lanes + lane;
-    *a = (int16_t)(*a - jump);
-    *b = (int16_t)(*b + jump);
-}
-
-typedef struct txp_seams {
-    const txp_source *source;
-    const txp_canvas *canvas;
-    txp_field *bend, *tone;
-    int first_band;
-} txp_seams;
-
-/* Measure the seams to the right of and below the pixels of a band, and set the jumps of the two
-   fields: bend (x, y) and tone (compared bytes). The step of colour at a seam is the difference of
-   both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large ones are
-   edges of something. Pulls are stored with the first of the two pixels. */
-static void txp_measure_band(void *context, int lane) {
-    const txp_seams *m = (const txp_seams *)context;
-    const txp_source *s = m->source;
-    const txp_canvas *c = m->canvas;
-    const txp_stack *k = &s->stack[0];
-    const int top = (m->first_band + 2 * lane) * TXP_BAND;
-    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
-    /* summed over 5 x 5 pixels */
-    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25;
-    txp_seam seams[TXP_SEAM_CACHE];
-    memset(seams, 0, sizeof seams);
-    for (int y = top; y < bottom; y++) {
-        for (int x = 0; x < c->width; x++) {
-            const size_t i = txp_index(c, x, y);
-            for (int d = 0; d < 2; d++) {
-                uint8_t *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
-                int qx = x + !d, qy = y + d, shift[2];
-                *bend = *tone = 255;
-                if (qx >= c->width) qx = 0;
-                if (qy >= c->height) qy = 0;
-                txp_place a = c->at[i];
-                const txp_place q = c->at[txp_index(c, qx, qy)];
-                if (a.x < 0 || q.x < 0) {
-                    *bend = *tone = TXP_PULL_SEAM;
-                    continue;
-                }
-                a.x += !d;
-                a.y += d;
-                if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
-                *tone = TXP_PULL_SEAM;
-                const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
-                          by = q.y + shift[1] - 2;
-                int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
-                if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    const txp_place from_a = {ax, ay};
-                    const txp_place from_b = {bx, by};
-                    txp_seam_step(s, k, from_a, from_b, sum);
-                    for (int b = 0; b < s->guide_at; b++)
-                        most = abs(sum[b]) > most ? abs(sum[b]) : most;
-                    if (most < low) *tone = 255;
-                    else if (most < high)
-                        *tone = (uint8_t)(TXP_PULL_SEAM +
-                                          (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
-                }
-                /* u(q) - u(i) = jump: added to q, subtracted from i */
-                const size_t j = txp_index(c, qx, qy);
-                if (shift[0] || shift[1]) {
-                    txp_field_mark(m->bend, x, y);
-                    txp_field_mark(m->bend, qx, qy);
-                }
-                if (most > 0 && most < high) {
-                    txp_field_mark(m->tone, x, y);
-                    txp_field_mark(m->tone, qx, qy);
-                }
-                for (size_t b = 0; b < 2; b++)
-                    txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
-                for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
-                    txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
-            }
-        }
-    }
-}
-
-/* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
-   tells whether there was no memory. */
-static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
-                           txm_arena *memory, txm_arena *scratch) {
+/* Compute the two fields of a canvas. */
+static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
+                             float **toned, txm_env *env) {
+    const txp_source *s = job->source;
+    const txp_origins *given = &job->given.from;
+    const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
-    f->width = c->width;
-    f->height = c->height;
-    f->wrap = c->wrap;
-    f->fixed = c->fixed;
-    f->lanes = lanes;
-    for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
-    f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
-    f->jump = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
-    f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
-    f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
-    f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
-    f->active = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
+    txm_arena scratch;
+    txp_field bend, tone;
+    txp_seams seams;
+    txm_status status = TXM_OK;
+    memset(&bend, 0, sizeof bend);
+    memset(&tone, 0, sizeof tone);
+    txm_arena_init(&scratch, env);
+    txp_field_make(&bend, c, 2, TXP_BEND_SCREEN, memory, &scratch);
+    txp_field_make(&tone, c, lanes, TXP_TONE_SCREEN, memory, &scratch);
+    if (memory->failed || scratch.failed) {
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
+        goto done;
+    }
+    for (size_t i = 0; i < pixels && given->bend; i++) {
+        if (!job->given.fixed[i]) continue;
+        const float *b = given->bend + 2 * i, *v = given->tone + (size_t)lanes * i;
+        const int x = (int)(i % (size_t)c->width), y = (int)(i / (size_t)c->width);
+        float most = 0;
+        memcpy(bend.value + 2 * i, b, 2 * sizeof(float));
+        memcpy(tone.value + (size_t)lanes * i, v, (size_t)lanes * sizeof(float));
+        for (int k = 0; k < lanes; k++) most = txm_maxf(most, fabsf(v[k]));
+        if (fabsf(b[0]) + fabsf(b[1]) > 0.05f) txp_field_mark(&bend, x, y);
+        if (most > 0.25f) txp_field_mark(&tone, x, y);
+    }
+    seams.source = s;
+    seams.canvas = c;
+    seams.bend = &bend;
+    seams.tone = &tone;
+    /* A band also writes to the first row of the next one: so every second band at a time, and the
+       last one, which may be followed by the first, alone. */
+    for (int turn = 0; turn < 3; turn++) {
+        const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
+        for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
+            const int count = (end - seams.first_band + 1) / 2;
+            status = txp_report(job, env, "blending");
+            if (status != TXM_OK) goto done;
+            txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
+        }
+    }
+    txp_field_spread(&bend);
+    txp_field_spread(&tone);
+    for (int i = 0; i < TXP_SWEEPS; i++) {
+        status = txp_report(job, env, "blending");
+        if (status != TXM_OK) goto done;
+        txp_relax_field(&bend, env);
+        txp_relax_field(&tone, env);
+    }
+    *bent = bend.value;
+    *toned = tone.value;
+done:
+    txm_arena_free(&scratch);
+    return status;
 }
 
 #endif /* TEXPATCH_FINISH_H */
