@@ -106,9 +106,13 @@ static void txp_relax_rows(void *context, int index) {
     }
 }
 
+/* Where a torus has an odd number of rows, the first and the last have one colour: not at a time. */
 static void txp_relax_field(txp_field *f, txm_env *env) {
-    for (f->colour = 0; f->colour < 2; f->colour++)
-        txm_parallel_for(env, (f->height + 7) / 8, txp_relax_rows, f);
+    const int parts = (f->height + 7) / 8, alone = f->wrap & TEXPATCH_TILE_Y && f->height % 2;
+    for (f->colour = 0; f->colour < 2; f->colour++) {
+        txm_parallel_for(env, parts - alone, txp_relax_rows, f);
+        if (alone) txp_relax_rows(f, parts - 1);
+    }
 }
 
 /* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
