@@ -464,7 +464,8 @@ typedef struct txp_canvas {
     int width, height, wrap; /* wrap: bits as in texpatch_desc.tileable                        */
     size_t pitch;
     uint8_t *pixels;
-    txp_place *at, *next; /* next: where a pass puts what it chooses                           */
+    txp_place *at;
+    txp_place *next; /* where a pass puts what it chooses; only during one                      */
     txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
     uint8_t *free_guide; /* 1 = the guide does not count here; NULL: it does, or there is none  */
@@ -3585,7 +3586,6 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     c->pixels = (uint8_t *)txm_arena_zero(arena, (size_t)(c->height + TXP_PAD) + 1, c->pitch);
     c->at = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->at);
-    c->next = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->next);
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
@@ -4091,6 +4091,26 @@ no_memory:
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
 }
 
+/* Every pixel of the canvas may take another place; all at a time, at the end. */
+static txm_status txp_step_choose(const texpatch_job *job, const txp_step *t, const txp_canvas *c,
+                                  txm_env *env) {
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    txp_canvas with = *c;
+    txm_arena scratch;
+    txm_status status;
+    txm_arena_init(&scratch, env);
+    with.next = (txp_place *)txm_arena_alloc(&scratch, pixels, sizeof *with.next);
+    if (scratch.failed) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
+    else if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &with, env);
+    else status = txp_run_polish(job, &with, env);
+    if (status == TXM_OK) {
+        memcpy(c->at, with.next, pixels * sizeof *c->at);
+        txp_canvas_fill(job->source, &job->source->stack[t->level], c, 0, c->height);
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
 /* A step of a job without a part. */
 static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     txm_arena memory;
@@ -4109,16 +4129,8 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
         canvas = finer;
     }
     const int is_new = level != job->level || t->kind == TXP_STEP_QUILT;
-    if (status == TXM_OK && t->kind != TXP_STEP_QUILT && t->kind != TXP_STEP_FINISH) {
-        if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &canvas, env);
-        else status = txp_run_polish(job, &canvas, env);
-        if (status == TXM_OK) {
-            txp_place *old = canvas.at;
-            canvas.at = canvas.next;
-            canvas.next = old;
-            txp_canvas_fill(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
-        }
-    }
+    if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
+        status = txp_step_choose(job, t, &canvas, env);
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
         txm_arena fields;
         txm_arena_init(&fields, env);

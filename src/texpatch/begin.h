@@ -145,6 +145,26 @@ no_memory:
     return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a job");
 }
 
+/* Every pixel of the canvas may take another place; all at a time, at the end. */
+static txm_status txp_step_choose(const texpatch_job *job, const txp_step *t, const txp_canvas *c,
+                                  txm_env *env) {
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    txp_canvas with = *c;
+    txm_arena scratch;
+    txm_status status;
+    txm_arena_init(&scratch, env);
+    with.next = (txp_place *)txm_arena_alloc(&scratch, pixels, sizeof *with.next);
+    if (scratch.failed) status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a pass");
+    else if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &with, env);
+    else status = txp_run_polish(job, &with, env);
+    if (status == TXM_OK) {
+        memcpy(c->at, with.next, pixels * sizeof *c->at);
+        txp_canvas_fill(job->source, &job->source->stack[t->level], c, 0, c->height);
+    }
+    txm_arena_free(&scratch);
+    return status;
+}
+
 /* A step of a job without a part. */
 static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     txm_arena memory;
@@ -163,16 +183,8 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
         canvas = finer;
     }
     const int is_new = level != job->level || t->kind == TXP_STEP_QUILT;
-    if (status == TXM_OK && t->kind != TXP_STEP_QUILT && t->kind != TXP_STEP_FINISH) {
-        if (t->kind == TXP_STEP_PASS) status = txp_run_pass(job, t, &canvas, env);
-        else status = txp_run_polish(job, &canvas, env);
-        if (status == TXM_OK) {
-            txp_place *old = canvas.at;
-            canvas.at = canvas.next;
-            canvas.next = old;
-            txp_canvas_fill(job->source, &job->source->stack[level], &canvas, 0, canvas.height);
-        }
-    }
+    if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
+        status = txp_step_choose(job, t, &canvas, env);
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
         txm_arena fields;
         txm_arena_init(&fields, env);

@@ -94,7 +94,8 @@ typedef struct txp_canvas {
     int width, height, wrap; /* wrap: bits as in texpatch_desc.tileable                        */
     size_t pitch;
     uint8_t *pixels;
-    txp_place *at, *next; /* next: where a pass puts what it chooses                           */
+    txp_place *at;
+    txp_place *next; /* where a pass puts what it chooses; only during one                      */
     txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
     uint8_t *free_guide; /* 1 = the guide does not count here; NULL: it does, or there is none  */

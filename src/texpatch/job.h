@@ -162,7 +162,6 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     c->pixels = (uint8_t *)txm_arena_zero(arena, (size_t)(c->height + TXP_PAD) + 1, c->pitch);
     c->at = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->at);
-    c->next = (txp_place *)txm_arena_alloc(arena, pixels, sizeof *c->next);
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
