@@ -85,9 +85,9 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 70 bytes for each pixel of the output while it is made, and a copy of each map that
-     has transparent pixels; some 6 for each pixel of the
-     exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 24
+     RGB: some 30 bytes for each pixel of the output while it is made, and 40 for each pixel of at
+     most 320 rows of it; a copy of each map that has transparent pixels; some 6 for each pixel of the
+     exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 20
      bytes for each pixel along the upper and lower sides of a row of cells.
 
    TIME   (one core of 2023; make bench measures yours)
@@ -3126,44 +3126,59 @@ static void txp_polish_band(void *context, int index) {
 enum {
     TXP_SWEEPS = 12,     /* of the relaxation                                                    */
     TXP_TILE = 16,       /* pixels: width of the tiles that are relaxed or skipped               */
-    TXP_FADE = 48,       /* pixels beyond which a seam has no influence                          */
+    TXP_TILE_ROWS = 8,   /* their height                                                         */
+    TXP_FADE = 2 * TXP_SWEEPS, /* pixels beyond which a jump is not felt: one for each colour of a
+                            sweep                                                                */
     TXP_JUMP_UNIT = 64   /* jumps are stored in 1 / 64                                           */
 };
 
-/* A field over the canvas with given jumps between neighbouring pixels: the minimum of
+/* A field over some rows of the canvas with given jumps between neighbouring pixels: the minimum of
 
        sum over neighbours of pull |u(q) - u(p) - jump|^2 + screen |u|^2,
 
-   which jumps at seams and fades within 1 / sqrt(screen) pixels.                                */
+   which jumps at seams and fades within 1 / sqrt(screen) pixels. Row 0 is row `top` of the canvas; of
+   a canvas that wraps, rows before the first and behind the last are those at the other end.     */
 typedef struct txp_field {
-    int width, height, wrap, lanes; /* lanes: values per pixel, 2 or a multiple of 4           */
+    const txp_canvas *canvas;
+    int top, height, lanes; /* lanes: values per pixel, 2 or a multiple of 4                   */
+    int closed;       /* these are all rows of the canvas, and the last is followed by the first */
     float *value;
-    int16_t *jump;    /* lanes per pixel: pull times jump, in 1 / TXP_JUMP_UNIT                 */
+    int16_t *jump;    /* lanes per pixel: pull times jump, in 1 / TXP_JUMP_UNIT; a row more      */
     uint8_t *pull[2]; /* to the right neighbour, to the lower one, in 1 / 255; 255 inside a piece */
     float scale[4 * 255 + 1]; /* by the sum of the four pulls: 1 / (sum + screen)               */
-    const uint8_t *fixed; /* 1 = value does not change; NULL: it does everywhere               */
-    uint8_t *active; /* of each tile of TXP_TILE x 8 pixels: 2 = it has jumps, 1 = near one    */
-    int tiles;     /* in a row                                                                */
-    int colour;    /* of the pixels that are relaxed now, on a checkerboard                   */
+    uint8_t *active; /* of each tile: 2 = it has jumps, 1 = near one; a row of tiles more      */
+    int tiles;       /* in a row                                                                */
+    int from, to;    /* rows that are relaxed now                                               */
+    int colour;      /* of their pixels, on a checkerboard                                      */
 } txp_field;
 
+/* The row of the canvas that row y of the field is; -1: none. */
+static inline int txp_field_row(const txp_field *f, int y) {
+    const int height = f->canvas->height;
+    const int row = f->top + y;
+    if (row >= 0 && row < height) return row;
+    return f->canvas->wrap & TEXPATCH_TILE_Y ? (row % height + height) % height : -1;
+}
+
 static inline void txp_field_mark(const txp_field *f, int x, int y) {
-    f->active[(size_t)(y / 8) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
+    f->active[(size_t)(y / TXP_TILE_ROWS) * (size_t)f->tiles + (size_t)(x / TXP_TILE)] = 2;
 }
 
 /* Activate the tiles within TXP_FADE of marked ones. */
 static void txp_field_spread(const txp_field *f) {
-    const int rows = (f->height + 7) / 8, across = TXP_FADE / TXP_TILE, along = TXP_FADE / 8;
+    const int rows = (f->height + TXP_TILE_ROWS - 1) / TXP_TILE_ROWS;
+    const int across = (TXP_FADE + TXP_TILE - 1) / TXP_TILE;
+    const int along = (TXP_FADE + TXP_TILE_ROWS - 1) / TXP_TILE_ROWS;
     for (int j = 0; j < rows; j++) {
         for (int i = 0; i < f->tiles; i++) {
             if (f->active[j * f->tiles + i] != 2) continue;
             for (int v = -along; v <= along; v++) {
                 int y = j + v;
-                if (f->wrap & TEXPATCH_TILE_Y) y = (y + 2 * rows) % rows;
+                if (f->closed) y = (y + 2 * rows) % rows;
                 if (y < 0 || y >= rows) continue;
                 for (int u = -across; u <= across; u++) {
                     int x = i + u;
-                    if (f->wrap & TEXPATCH_TILE_X) x = (x + 2 * f->tiles) % f->tiles;
+                    if (f->canvas->wrap & TEXPATCH_TILE_X) x = (x + 2 * f->tiles) % f->tiles;
                     if (x < 0 || x >= f->tiles) continue;
                     if (!f->active[y * f->tiles + x]) f->active[y * f->tiles + x] = 1;
                 }
@@ -3190,23 +3205,30 @@ static inline void txp_relax_pixel(const txp_field *f, size_t i, const size_t *n
     }
 }
 
-/* The pixels of one colour in 8 rows: successive over-relaxation. */
+/* The pixels of one colour in a row of tiles: successive over-relaxation. */
 static void txp_relax_rows(void *context, int index) {
     const txp_field *f = (const txp_field *)context;
-    const int w = f->width, h = f->height, lanes = f->lanes;
-    for (int y = 8 * index; y < 8 * index + 8 && y < h; y++) {
-        const int up = y > 0 ? y - 1 : f->wrap & TEXPATCH_TILE_Y ? h - 1 : -1;
-        const int down = y + 1 < h ? y + 1 : f->wrap & TEXPATCH_TILE_Y ? 0 : -1;
-        const uint8_t *active = f->active + (size_t)(y / 8) * (size_t)f->tiles;
+    const int w = f->canvas->width, h = f->height, lanes = f->lanes;
+    const int wraps = f->canvas->wrap & TEXPATCH_TILE_X, part = f->from / TXP_TILE_ROWS + index;
+    const int first = part * TXP_TILE_ROWS, end = first + TXP_TILE_ROWS;
+    const uint8_t *active = f->active + (size_t)part * (size_t)f->tiles;
+    for (int y = first < f->from ? f->from : first; y < end && y < f->to; y++) {
+        const int row = txp_field_row(f, y);
+        if (row < 0) continue;
+        const int is_open = !f->closed, last = h - 1;
+        int up = y > 0 ? y - 1 : is_open ? -1 : last, down = y < last ? y + 1 : is_open ? -1 : 0;
+        if (up >= 0 && txp_field_row(f, up) < 0) up = -1;
+        if (down >= 0 && txp_field_row(f, down) < 0) down = -1;
+        const uint8_t *fixed = f->canvas->fixed ? f->canvas->fixed + txp_index(f->canvas, 0, row) : NULL;
         for (int x = (y + f->colour) % 2; x < w; x += 2) {
             const size_t i = (size_t)y * (size_t)w + (size_t)x;
             if (!active[x / TXP_TILE]) {
                 x += TXP_TILE - 2; /* the next tile */
                 continue;
             }
-            if (f->fixed && f->fixed[i]) continue;
-            const int left = x > 0 ? x - 1 : f->wrap & TEXPATCH_TILE_X ? w - 1 : -1;
-            const int right = x + 1 < w ? x + 1 : f->wrap & TEXPATCH_TILE_X ? 0 : -1;
+            if (fixed && fixed[x]) continue;
+            const int left = x > 0 ? x - 1 : wraps ? w - 1 : -1;
+            const int right = x + 1 < w ? x + 1 : wraps ? 0 : -1;
             size_t next[4];
             uint8_t pull[4];
             next[0] = left < 0 ? i : (size_t)y * (size_t)w + (size_t)left;
@@ -3224,32 +3246,54 @@ static void txp_relax_rows(void *context, int index) {
     }
 }
 
-/* Where a torus has an odd number of rows, the first and the last have one colour: not at a time. */
-static void txp_relax_field(txp_field *f, txm_env *env) {
-    const int parts = (f->height + 7) / 8, alone = f->wrap & TEXPATCH_TILE_Y && f->height % 2;
-    for (f->colour = 0; f->colour < 2; f->colour++) {
-        txm_parallel_for(env, parts - alone, txp_relax_rows, f);
-        if (alone) txp_relax_rows(f, parts - 1);
-    }
+/* One sweep over the pixels of one colour in rows from..to-1. Where a torus has an odd number of rows,
+   the first and the last have one colour: not at a time. */
+static void txp_relax_field(txp_field *f, int from, int to, int colour, txm_env *env) {
+    const int tile = TXP_TILE_ROWS, parts = (to + tile - 1) / tile - from / tile;
+    const int alone = f->closed && f->height % 2;
+    f->from = from;
+    f->to = to;
+    f->colour = colour;
+    txm_parallel_for(env, parts - alone, txp_relax_rows, f);
+    if (alone) txp_relax_rows(f, parts - 1);
 }
 
-/* Allocate a field: its values, all 0, in memory, the rest in scratch. The failed of both arenas
-   tells whether there was no memory. */
-static void txp_field_make(txp_field *f, const txp_canvas *c, int lanes, double screen,
-                           txm_arena *memory, txm_arena *scratch) {
-    const size_t pixels = (size_t)c->width * (size_t)c->height;
-    f->width = c->width;
-    f->height = c->height;
-    f->wrap = c->wrap;
-    f->fixed = c->fixed;
+/* Allocate a field over so many rows of a canvas. arena->failed: no memory. */
+static void txp_field_make(txp_field *f, const txp_canvas *c, int height, int lanes, double screen,
+                           txm_arena *arena) {
+    const size_t width = (size_t)c->width, pixels = width * (size_t)height;
+    const size_t rows = (size_t)(height + TXP_TILE_ROWS - 1) / TXP_TILE_ROWS;
+    f->canvas = c;
+    f->height = height;
+    f->closed = height == c->height && c->wrap & TEXPATCH_TILE_Y;
     f->lanes = lanes;
     for (int i = 0; i <= 4 * 255; i++) f->scale[i] = txm_float(1 / (i + 255 * screen));
-    f->value = (float *)txm_arena_zero(memory, pixels, (size_t)lanes * sizeof(float));
-    f->jump = (int16_t *)txm_arena_zero(scratch, pixels, (size_t)lanes * sizeof(int16_t));
-    f->pull[0] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
-    f->pull[1] = (uint8_t *)txm_arena_alloc(scratch, pixels, 1);
+    f->value = (float *)txm_arena_zero(arena, pixels, (size_t)lanes * sizeof(float));
+    f->jump = (int16_t *)txm_arena_zero(arena, pixels + width, (size_t)lanes * sizeof(int16_t));
+    f->pull[0] = (uint8_t *)txm_arena_zero(arena, pixels, 1);
+    f->pull[1] = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     f->tiles = (c->width + TXP_TILE - 1) / TXP_TILE;
-    f->active = (uint8_t *)txm_arena_zero(scratch, (size_t)f->tiles, (size_t)(c->height + 7) / 8);
+    f->active = (uint8_t *)txm_arena_zero(arena, (size_t)f->tiles, rows + 1);
+}
+
+/* Go on to later rows: what is known of the last rows becomes that of the first, the rest is none. */
+static void txp_field_move(txp_field *f, int rows) {
+    const size_t width = (size_t)f->canvas->width, tiles = (size_t)f->tiles;
+    const size_t stay = (size_t)(f->height - rows), gone = (size_t)rows;
+    const size_t jumps = width * (size_t)f->lanes, tile_rows = (size_t)(f->height / TXP_TILE_ROWS);
+    const size_t tiles_gone = gone / TXP_TILE_ROWS, tiles_stay = tile_rows - tiles_gone;
+    TXM_ASSERT(rows % TXP_TILE_ROWS == 0 && f->height % TXP_TILE_ROWS == 0 && rows <= f->height);
+    f->top += rows;
+    for (int d = 0; d < 2; d++) {
+        memmove(f->pull[d], f->pull[d] + width * gone, width * stay);
+        memset(f->pull[d] + width * stay, 0, width * gone);
+    }
+    memmove(f->jump, f->jump + jumps * gone, jumps * (stay + 1) * sizeof *f->jump);
+    memset(f->jump + jumps * (stay + 1), 0, jumps * gone * sizeof *f->jump);
+    memmove(f->active, f->active + tiles * tiles_gone, tiles * (tiles_stay + 1));
+    memset(f->active + tiles * (tiles_stay + 1), 0, tiles * tiles_gone);
+    for (size_t i = 0; i < tiles * (tile_rows + 1); i++) f->active[i] &= 2;
+    memset(f->value, 0, width * (size_t)f->height * (size_t)f->lanes * sizeof *f->value);
 }
 
 /* ---- seams: where lines should meet, and steps of colour ----------------------------------- */
@@ -3355,75 +3399,79 @@ static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t l
 
 typedef struct txp_seams {
     const txp_source *source;
-    const txp_canvas *canvas;
-    txp_field *bend, *tone;
-    int first_band;
+    txp_field *bend, *tone; /* over the same rows                                             */
+    int first_row;          /* of the first band, a multiple of TXP_BAND                       */
 } txp_seams;
 
-/* Measure the seams to the right of and below the pixels of a band, and set the jumps of the two
-   fields: bend (x, y) and tone (compared bytes). The step of colour at a seam is the difference of
-   both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large ones are
-   edges of something. Pulls are stored with the first of the two pixels. */
+/* Measure the seam between pixel (x, y) of the fields and its right (d = 0) or lower neighbour (qx, qy),
+   and set the jumps of the two fields: bend (x, y) and tone (compared bytes). a, q: what both show. */
+static void txp_measure_seam(const txp_seams *m, txp_seam *seams, int x, int y, int qx, int qy, int d,
+                             txp_place a, txp_place q) {
+    const txp_source *s = m->source;
+    const txp_stack *k = &s->stack[0];
+    const size_t w = (size_t)m->bend->canvas->width;
+    const size_t i = (size_t)y * w + (size_t)x, j = (size_t)qy * w + (size_t)qx;
+    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25; /* summed over 5 x 5 pixels */
+    uint8_t *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
+    int shift[2];
+    *bend = *tone = 255;
+    if (a.x < 0 || q.x < 0) {
+        *bend = *tone = TXP_PULL_SEAM;
+        return;
+    }
+    a.x += !d;
+    a.y += d;
+    if (a.x == q.x && a.y == q.y) return;
+    *bend = txp_seam_cached(s, seams, x, m->bend->top + y, a, q, shift) ? 255 : TXP_PULL_FITS;
+    *tone = TXP_PULL_SEAM;
+    const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2, by = q.y + shift[1] - 2;
+    int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
+    if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
+        const txp_place from_a = {ax, ay};
+        const txp_place from_b = {bx, by};
+        txp_seam_step(s, k, from_a, from_b, sum);
+        for (int b = 0; b < s->guide_at; b++) most = abs(sum[b]) > most ? abs(sum[b]) : most;
+        if (most < low) *tone = 255;
+        else if (most < high)
+            *tone = (uint8_t)(TXP_PULL_SEAM + (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
+    }
+    if (shift[0] || shift[1]) {
+        txp_field_mark(m->bend, x, y);
+        txp_field_mark(m->bend, qx, qy);
+    }
+    if (most > 0 && most < high) {
+        txp_field_mark(m->tone, x, y);
+        txp_field_mark(m->tone, qx, qy);
+    }
+    /* u(q) - u(i) = jump: added to q, subtracted from i */
+    for (size_t b = 0; b < 2; b++)
+        txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
+    for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
+        txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
+}
+
+/* Measure the seams to the right of and below the pixels of a band. The step of colour at a seam is the
+   difference of both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large
+   ones are edges of something. Pulls are stored with the first of the two pixels. */
 static void txp_measure_band(void *context, int lane) {
     const txp_seams *m = (const txp_seams *)context;
-    const txp_source *s = m->source;
-    const txp_canvas *c = m->canvas;
-    const txp_stack *k = &s->stack[0];
-    const int top = (m->first_band + 2 * lane) * TXP_BAND;
-    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
-    /* summed over 5 x 5 pixels */
-    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25;
+    const txp_field *f = m->bend;
+    const txp_canvas *c = f->canvas;
+    const int top = m->first_row + 2 * lane * TXP_BAND;
+    const int bottom = top + TXP_BAND < f->height ? top + TXP_BAND : f->height;
     txp_seam seams[TXP_SEAM_CACHE];
     memset(seams, 0, sizeof seams);
     for (int y = top; y < bottom; y++) {
+        const int below = f->closed && y + 1 == f->height ? 0 : y + 1;
+        const int row = txp_field_row(f, y), next = txp_field_row(f, below);
+        if (row < 0) continue;
         for (int x = 0; x < c->width; x++) {
-            const size_t i = txp_index(c, x, y);
-            for (int d = 0; d < 2; d++) {
-                uint8_t *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
-                int qx = x + !d, qy = y + d, shift[2];
-                *bend = *tone = 255;
-                if (qx >= c->width) qx = 0;
-                if (qy >= c->height) qy = 0;
-                txp_place a = c->at[i];
-                const txp_place q = c->at[txp_index(c, qx, qy)];
-                if (a.x < 0 || q.x < 0) {
-                    *bend = *tone = TXP_PULL_SEAM;
-                    continue;
-                }
-                a.x += !d;
-                a.y += d;
-                if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
-                *tone = TXP_PULL_SEAM;
-                const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
-                          by = q.y + shift[1] - 2;
-                int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
-                if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    const txp_place from_a = {ax, ay};
-                    const txp_place from_b = {bx, by};
-                    txp_seam_step(s, k, from_a, from_b, sum);
-                    for (int b = 0; b < s->guide_at; b++)
-                        most = abs(sum[b]) > most ? abs(sum[b]) : most;
-                    if (most < low) *tone = 255;
-                    else if (most < high)
-                        *tone = (uint8_t)(TXP_PULL_SEAM +
-                                          (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
-                }
-                /* u(q) - u(i) = jump: added to q, subtracted from i */
-                const size_t j = txp_index(c, qx, qy);
-                if (shift[0] || shift[1]) {
-                    txp_field_mark(m->bend, x, y);
-                    txp_field_mark(m->bend, qx, qy);
-                }
-                if (most > 0 && most < high) {
-                    txp_field_mark(m->tone, x, y);
-                    txp_field_mark(m->tone, qx, qy);
-                }
-                for (size_t b = 0; b < 2; b++)
-                    txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
-                for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
-                    txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
-            }
+            const txp_place a = c->at[txp_index(c, x, row)];
+            const int right = x + 1 < c->width ? x + 1 : c->wrap & TEXPATCH_TILE_X ? 0 : -1;
+            if (right >= 0)
+                txp_measure_seam(m, seams, x, y, right, y, 0, a, c->at[txp_index(c, right, row)]);
+            if (next >= 0)
+                txp_measure_seam(m, seams, x, y, x, below, 1, a, c->at[txp_index(c, x, next)]);
         }
     }
 }
@@ -3441,12 +3489,14 @@ typedef struct txp_step {
     float cost; /* approximate, relative to other steps */
 } txp_step;
 
-/* Where pixels come from. */
+/* Where pixels come from, and what is done to them. */
 typedef struct txp_origins {
     txp_place *at;
-    float *bend; /* x, y by which each pixel's place is moved                                   */
-    float *tone; /* what is added to each compared byte, txp_lanes of them                      */
+    int16_t *bend; /* x, y by which each pixel's place is moved, times TXP_BEND_UNIT             */
+    int16_t *tone; /* what is added to each compared byte, txp_lanes of them, times TXP_TONE_UNIT */
 } txp_origins;
+#define TXP_BEND_UNIT 2048.0f /* of a pixel; pieces are bent by some pixels                        */
+#define TXP_TONE_UNIT 256.0f  /* of a gray level; tones change by up to TXP_LARGE_STEP             */
 
 /* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
 typedef struct txp_given {
@@ -3469,8 +3519,7 @@ struct texpatch_job {
     int level; /* that the canvas has now; -1: none yet                             */
     txm_arena canvas_memory, finish_memory; /* of the canvas; of bend and tone                   */
     txp_canvas canvas;
-    float *bend; /* x, y by which each pixel's place is moved; NULL: not yet           */
-    float *tone; /* what is added to each compared byte, txp_lanes of them             */
+    int16_t *bend, *tone; /* as in txp_origins; NULL: not yet                          */
     txp_given given;
     uint64_t seed;
     /* a part that is being made again lies at (part_x, part_y) of the canvas */
@@ -3496,8 +3545,8 @@ static inline txp_origins txp_origins_of(const texpatch_job *job) {
 static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
                                     size_t k, size_t count, size_t lanes) {
     memcpy(to->at + i, from->at + k, count * sizeof *to->at);
-    memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof(float));
-    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof(float));
+    memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof *to->bend);
+    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof *to->tone);
 }
 
 /* The next step; there is room for two windows on all levels, 16 passes each, the quilt, polishing twice
@@ -3886,66 +3935,135 @@ static txm_status txp_run_polish(const texpatch_job *job, const txp_canvas *c, t
 
 /* ---- pieces warped until lines meet, steps of colour spread ----------------------------- */
 
+enum {
+    TXP_FINISH_ROWS = 256, /* rows of a large canvas that are finished at a time ...               */
+    TXP_FINISH_REACH = TXP_BAND /* ... with so many before and behind them, TXP_FADE at least       */
+};
 #define TXP_BEND_SCREEN 0.02  /* bends fade within 7 pixels                                       */
 #define TXP_TONE_SCREEN 0.004 /* tones within 16                                                  */
+#define TXP_BENT 0.05f        /* pixels and gray levels: kept pixels that are bent or toned more  */
+#define TXP_TONED 0.25f       /* act on their surroundings                                        */
 
-/* Compute the two fields of a canvas. */
-static txm_status txp_finish(texpatch_job *job, txp_canvas *c, txm_arena *memory, float **bent,
-                             float **toned, txm_env *env) {
-    const txp_source *s = job->source;
-    const txp_origins *given = &job->given.from;
-    const int lanes = txp_lanes(s), bands = (c->height + TXP_BAND - 1) / TXP_BAND;
-    const size_t pixels = (size_t)c->width * (size_t)c->height;
-    txm_arena scratch;
+/* The two fields over some rows. */
+typedef struct txp_fields {
     txp_field bend, tone;
+    int measured; /* rows from here on have no seams yet                                          */
+} txp_fields;
+
+/* A stored value, and back. */
+static inline int16_t txp_code(float value, float unit) {
+    return (int16_t)floorf(txm_float(txm_clampf(txm_float(value * unit), -32767, 32767) + 0.5f));
+}
+
+/* Set the values of fixed pixels. */
+static void txp_fields_fix(const txp_origins *given, txp_fields *f) {
+    const txp_canvas *c = f->bend.canvas;
+    const size_t lanes = (size_t)f->tone.lanes;
+    if (!given->bend) return;
+    for (int y = 0; y < f->bend.height; y++) {
+        const int row = txp_field_row(&f->bend, y);
+        for (int x = 0; x < c->width && row >= 0; x++) {
+            const size_t i = txp_index(c, x, row), at = (size_t)y * (size_t)c->width + (size_t)x;
+            const int16_t *b = given->bend + 2 * i, *v = given->tone + lanes * i;
+            float *bent = f->bend.value + 2 * at, *toned = f->tone.value + lanes * at, most = 0;
+            if (!c->fixed[i]) continue;
+            for (size_t k = 0; k < 2; k++) bent[k] = txm_float((float)b[k] / TXP_BEND_UNIT);
+            for (size_t k = 0; k < lanes; k++) {
+                toned[k] = txm_float((float)v[k] / TXP_TONE_UNIT);
+                most = txm_maxf(most, fabsf(toned[k]));
+            }
+            if (fabsf(bent[0]) + fabsf(bent[1]) > TXP_BENT) txp_field_mark(&f->bend, x, y);
+            if (most > TXP_TONED) txp_field_mark(&f->tone, x, y);
+        }
+    }
+}
+
+/* Measure the seams of the rows that have none yet. A band also writes to the first row of the next
+   one: so every second band at a time, and the last one, which may be followed by the first, alone. */
+static txm_status txp_fields_measure(const texpatch_job *job, txp_fields *f, txm_env *env) {
     txp_seams seams;
-    txm_status status = TXM_OK;
-    memset(&bend, 0, sizeof bend);
-    memset(&tone, 0, sizeof tone);
-    txm_arena_init(&scratch, env);
-    txp_field_make(&bend, c, 2, TXP_BEND_SCREEN, memory, &scratch);
-    txp_field_make(&tone, c, lanes, TXP_TONE_SCREEN, memory, &scratch);
-    if (memory->failed || scratch.failed) {
-        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
-        goto done;
-    }
-    for (size_t i = 0; i < pixels && given->bend; i++) {
-        if (!job->given.fixed[i]) continue;
-        const float *b = given->bend + 2 * i, *v = given->tone + (size_t)lanes * i;
-        const int x = (int)(i % (size_t)c->width), y = (int)(i / (size_t)c->width);
-        float most = 0;
-        memcpy(bend.value + 2 * i, b, 2 * sizeof(float));
-        memcpy(tone.value + (size_t)lanes * i, v, (size_t)lanes * sizeof(float));
-        for (int k = 0; k < lanes; k++) most = txm_maxf(most, fabsf(v[k]));
-        if (fabsf(b[0]) + fabsf(b[1]) > 0.05f) txp_field_mark(&bend, x, y);
-        if (most > 0.25f) txp_field_mark(&tone, x, y);
-    }
-    seams.source = s;
-    seams.canvas = c;
-    seams.bend = &bend;
-    seams.tone = &tone;
-    /* A band also writes to the first row of the next one: so every second band at a time, and the
-       last one, which may be followed by the first, alone. */
+    const int bands = (f->bend.height - f->measured + TXP_BAND - 1) / TXP_BAND;
+    seams.source = job->source;
+    seams.bend = &f->bend;
+    seams.tone = &f->tone;
     for (int turn = 0; turn < 3; turn++) {
-        const int end = turn < 2 ? bands - 1 : bands, from = turn < 2 ? turn : bands - 1;
-        for (seams.first_band = from; seams.first_band < end; seams.first_band += 2 * TXP_LANES) {
-            const int count = (end - seams.first_band + 1) / 2;
-            status = txp_report(job, env, "blending");
-            if (status != TXM_OK) goto done;
+        const int end = turn < 2 ? bands - 1 : bands;
+        for (int band = turn < 2 ? turn : bands - 1; band < end; band += 2 * TXP_LANES) {
+            const int count = (end - band + 1) / 2;
+            const txm_status status = txp_report(job, env, "blending");
+            if (status != TXM_OK) return status;
+            seams.first_row = f->measured + band * TXP_BAND;
             txm_parallel_for(env, count < TXP_LANES ? count : TXP_LANES, txp_measure_band, &seams);
         }
     }
-    txp_field_spread(&bend);
-    txp_field_spread(&tone);
-    for (int i = 0; i < TXP_SWEEPS; i++) {
-        status = txp_report(job, env, "blending");
-        if (status != TXM_OK) goto done;
-        txp_relax_field(&bend, env);
-        txp_relax_field(&tone, env);
+    f->measured = f->bend.height;
+    return TXM_OK;
+}
+
+/* Relax rows from..to-1. Of other rows only those that still act on them in the sweeps to come. */
+static txm_status txp_fields_relax(const texpatch_job *job, txp_fields *f, int from, int to,
+                                   txm_env *env) {
+    const int height = f->bend.height;
+    txp_field_spread(&f->bend);
+    txp_field_spread(&f->tone);
+    for (int left = 2 * TXP_SWEEPS - 1; left >= 0; left--) {
+        const int first = from - left > 0 ? from - left : 0;
+        const int end = to + left < height ? to + left : height;
+        const int is_all = f->bend.closed, colour = (left + 1) % 2;
+        const txm_status status = colour ? TXM_OK : txp_report(job, env, "blending");
+        if (status != TXM_OK) return status;
+        txp_relax_field(&f->bend, is_all ? 0 : first, is_all ? height : end, colour, env);
+        txp_relax_field(&f->tone, is_all ? 0 : first, is_all ? height : end, colour, env);
     }
-    *bent = bend.value;
-    *toned = tone.value;
-done:
+    return TXM_OK;
+}
+
+/* Store rows from..to-1 of the fields. */
+static void txp_fields_store(const txp_fields *f, int from, int to, int16_t *bend, int16_t *tone) {
+    const txp_canvas *c = f->bend.canvas;
+    const size_t width = (size_t)c->width, lanes = (size_t)f->tone.lanes;
+    const size_t first = (size_t)(f->bend.top + from) * width, at = (size_t)from * width;
+    const size_t count = (size_t)(to - from) * width;
+    TXM_ASSERT(f->bend.top + from >= 0 && f->bend.top + to <= c->height);
+    for (size_t i = 0; i < 2 * count; i++)
+        bend[2 * first + i] = txp_code(f->bend.value[2 * at + i], TXP_BEND_UNIT);
+    for (size_t i = 0; i < lanes * count; i++)
+        tone[lanes * first + i] = txp_code(f->tone.value[lanes * at + i], TXP_TONE_UNIT);
+}
+
+/* Compute how the pieces of a canvas are bent and toned. A large one is done `step` rows at a time, a
+   multiple of TXP_BAND: the fields take 40 bytes a pixel of RGB, what is stored of them 12. */
+static txm_status txp_finish(const texpatch_job *job, const txp_canvas *c, int step, txm_arena *memory,
+                             txp_origins *out, txm_env *env) {
+    const int lanes = txp_lanes(job->source), reach = TXP_FINISH_REACH;
+    const int is_whole = c->height <= step + 2 * reach, rows = is_whole ? c->height : step + 2 * reach;
+    const size_t pixels = (size_t)c->width * (size_t)c->height;
+    txm_arena scratch;
+    txp_fields f;
+    txm_status status = TXM_OK;
+    TXM_ASSERT(reach >= TXP_FADE && step % TXP_BAND == 0);
+    memset(&f, 0, sizeof f);
+    txm_arena_init(&scratch, env);
+    txp_field_make(&f.bend, c, rows, 2, TXP_BEND_SCREEN, &scratch);
+    txp_field_make(&f.tone, c, rows, lanes, TXP_TONE_SCREEN, &scratch);
+    out->bend = (int16_t *)txm_arena_alloc(memory, pixels, 2 * sizeof *out->bend);
+    out->tone = (int16_t *)txm_arena_alloc(memory, pixels, (size_t)lanes * sizeof *out->tone);
+    if (memory->failed || scratch.failed)
+        status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
+    if (!is_whole) f.bend.top = f.tone.top = -reach;
+    for (int y = 0; y < c->height && status == TXM_OK; y += step) {
+        const int from = is_whole ? 0 : reach, left = c->height - y;
+        const int to = is_whole ? rows : from + (left < step ? left : step);
+        txp_fields_fix(&job->given.from, &f);
+        status = txp_fields_measure(job, &f, env);
+        if (status == TXM_OK) status = txp_fields_relax(job, &f, from, to, env);
+        if (status != TXM_OK) break;
+        txp_fields_store(&f, from, to, out->bend, out->tone);
+        if (is_whole) break;
+        txp_field_move(&f.bend, step);
+        txp_field_move(&f.tone, step);
+        f.measured = rows - step;
+    }
     txm_arena_free(&scratch);
     return status;
 }
@@ -3987,8 +4105,8 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     if (places) {
         txp_origins *o = &g->from;
         o->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *o->at);
-        o->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
-        o->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
+        o->bend = (int16_t *)txm_arena_zero(memory, pixels, 2 * sizeof *o->bend);
+        o->tone = (int16_t *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof *o->tone);
     }
 }
 
@@ -4132,11 +4250,16 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
         status = txp_step_choose(job, t, &canvas, env);
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
-        txm_arena fields;
-        txm_arena_init(&fields, env);
-        status = txp_finish(job, &canvas, &fields, &job->bend, &job->tone, env);
-        if (status == TXM_OK) job->finish_memory = fields;
-        else txm_arena_free(&fields);
+        txm_arena stored;
+        txp_origins made;
+        txm_arena_init(&stored, env);
+        status = txp_finish(job, &canvas, TXP_FINISH_ROWS, &stored, &made, env);
+        if (status != TXM_OK) txm_arena_free(&stored);
+        else {
+            job->finish_memory = stored;
+            job->bend = made.bend;
+            job->tone = made.tone;
+        }
     }
     if (status != TXM_OK) {
         txm_arena_free(&memory);
@@ -4192,12 +4315,13 @@ TEXPATCH_API int texpatch_lattice(const texpatch_job *job, float vectors[4]) {
 /* ---- what a pixel shows ----------------------------------------------------------------- */
 
 #define TXP_LEAST_BEND 0.05 /* pixels: less is none */
+enum { TXP_LEAST_TONE = 5 };  /* 1 / TXP_TONE_UNIT of a gray level */
 
 /* What a pixel of the output shows: place (x, y) of sheet `sheet`; sheet -1: a kept pixel. */
 typedef struct txp_pixel {
     int sheet, is_whole;
     double x, y;
-    const float *tone; /* NULL: none */
+    const int16_t *tone; /* as in txp_origins; NULL: none */
 } txp_pixel;
 
 /* May all the pixels be used between which (x, y) of a sheet lies? */
@@ -4237,7 +4361,7 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     out.x = p.x;
     out.y = p.y - s->stack[0].first[out.sheet];
     if (!job->bend) return out;
-    double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
+    double bx = job->bend[2 * i] / (double)TXP_BEND_UNIT, by = job->bend[2 * i + 1] / (double)TXP_BEND_UNIT;
     while (bx * bx + by * by >= TXP_LEAST_BEND * TXP_LEAST_BEND &&
            !txp_is_usable(s, out.sheet, out.x + bx, out.y + by)) {
         bx /= 2; /* towards the place itself, which may be used */
@@ -4317,7 +4441,7 @@ static void txp_draw_row(void *context, int row) {
         int is_copy = p.is_whole && sheet->plain && !(u->kinds[d->map].is_normal && sheet->turn);
         txp_sheet_place(sheet, p.x, p.y, &ex, &ey);
         for (int c = 0; c < channels && p.tone && d->tone_at >= 0 && is_copy; c++)
-            is_copy = fabsf(p.tone[d->tone_at + c]) < 0.02f;
+            is_copy = abs(p.tone[d->tone_at + c]) < TXP_LEAST_TONE;
         if (is_copy) {
             memcpy(to, (const uint8_t *)txm_image_row_const(im, (int)ey) + (size_t)(int)ex * sample,
                    sample);
@@ -4332,7 +4456,7 @@ static void txp_draw_row(void *context, int row) {
             for (int c = 0; c < channels; c++) {
                 double scale = d->tone_scale;
                 if (d->has_alpha && c == channels - 1) scale *= txp_half_shown(v[c]);
-                v[c] = txm_clampf(txm_float(v[c] + scale * (double)p.tone[d->tone_at + c]), low,
+                v[c] = txm_clampf(txm_float(v[c] + scale * p.tone[d->tone_at + c]), low,
                                   high);
             }
         }
@@ -4359,7 +4483,7 @@ static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_
     if (!(u->kinds[map].weight > 0) || u->kinds[map].is_normal || u->kinds[map].is_label)
         d->tone_at = -1;
     else
-        d->tone_scale = (double)(u->high[map] - u->low[map]) / 255 *
+        d->tone_scale = (double)(u->high[map] - u->low[map]) / 255 / (double)TXP_TONE_UNIT *
                         (double)u->most_weight / (double)u->kinds[map].weight;
     return TXM_OK;
 }
@@ -4712,8 +4836,8 @@ static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int 
     if (status == TXM_OK) {
         txp_origins *o = &p->from;
         o->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *o->at);
-        o->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
-        o->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
+        o->bend = (int16_t *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof *o->bend);
+        o->tone = (int16_t *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof *o->tone);
         if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }

@@ -41,8 +41,8 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
     if (places) {
         txp_origins *o = &g->from;
         o->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *o->at);
-        o->bend = (float *)txm_arena_zero(memory, pixels, 2 * sizeof(float));
-        o->tone = (float *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof(float));
+        o->bend = (int16_t *)txm_arena_zero(memory, pixels, 2 * sizeof *o->bend);
+        o->tone = (int16_t *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof *o->tone);
     }
 }
 
@@ -186,11 +186,16 @@ static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
         status = txp_step_choose(job, t, &canvas, env);
     if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
-        txm_arena fields;
-        txm_arena_init(&fields, env);
-        status = txp_finish(job, &canvas, &fields, &job->bend, &job->tone, env);
-        if (status == TXM_OK) job->finish_memory = fields;
-        else txm_arena_free(&fields);
+        txm_arena stored;
+        txp_origins made;
+        txm_arena_init(&stored, env);
+        status = txp_finish(job, &canvas, TXP_FINISH_ROWS, &stored, &made, env);
+        if (status != TXM_OK) txm_arena_free(&stored);
+        else {
+            job->finish_memory = stored;
+            job->bend = made.bend;
+            job->tone = made.tone;
+        }
     }
     if (status != TXM_OK) {
         txm_arena_free(&memory);

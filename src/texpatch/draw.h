@@ -6,12 +6,13 @@
 /* ---- what a pixel shows ----------------------------------------------------------------- */
 
 #define TXP_LEAST_BEND 0.05 /* pixels: less is none */
+enum { TXP_LEAST_TONE = 5 };  /* 1 / TXP_TONE_UNIT of a gray level */
 
 /* What a pixel of the output shows: place (x, y) of sheet `sheet`; sheet -1: a kept pixel. */
 typedef struct txp_pixel {
     int sheet, is_whole;
     double x, y;
-    const float *tone; /* NULL: none */
+    const int16_t *tone; /* as in txp_origins; NULL: none */
 } txp_pixel;
 
 /* May all the pixels be used between which (x, y) of a sheet lies? */
@@ -51,7 +52,7 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
     out.x = p.x;
     out.y = p.y - s->stack[0].first[out.sheet];
     if (!job->bend) return out;
-    double bx = (double)job->bend[2 * i], by = (double)job->bend[2 * i + 1];
+    double bx = job->bend[2 * i] / (double)TXP_BEND_UNIT, by = job->bend[2 * i + 1] / (double)TXP_BEND_UNIT;
     while (bx * bx + by * by >= TXP_LEAST_BEND * TXP_LEAST_BEND &&
            !txp_is_usable(s, out.sheet, out.x + bx, out.y + by)) {
         bx /= 2; /* towards the place itself, which may be used */
@@ -131,7 +132,7 @@ static void txp_draw_row(void *context, int row) {
         int is_copy = p.is_whole && sheet->plain && !(u->kinds[d->map].is_normal && sheet->turn);
         txp_sheet_place(sheet, p.x, p.y, &ex, &ey);
         for (int c = 0; c < channels && p.tone && d->tone_at >= 0 && is_copy; c++)
-            is_copy = fabsf(p.tone[d->tone_at + c]) < 0.02f;
+            is_copy = abs(p.tone[d->tone_at + c]) < TXP_LEAST_TONE;
         if (is_copy) {
             memcpy(to, (const uint8_t *)txm_image_row_const(im, (int)ey) + (size_t)(int)ex * sample,
                    sample);
@@ -146,7 +147,7 @@ static void txp_draw_row(void *context, int row) {
             for (int c = 0; c < channels; c++) {
                 double scale = d->tone_scale;
                 if (d->has_alpha && c == channels - 1) scale *= txp_half_shown(v[c]);
-                v[c] = txm_clampf(txm_float(v[c] + scale * (double)p.tone[d->tone_at + c]), low,
+                v[c] = txm_clampf(txm_float(v[c] + scale * p.tone[d->tone_at + c]), low,
                                   high);
             }
         }
@@ -173,7 +174,7 @@ static txm_status txp_draw_begin(const txp_setup *u, int map, txm_env *env, txm_
     if (!(u->kinds[map].weight > 0) || u->kinds[map].is_normal || u->kinds[map].is_label)
         d->tone_at = -1;
     else
-        d->tone_scale = (double)(u->high[map] - u->low[map]) / 255 *
+        d->tone_scale = (double)(u->high[map] - u->low[map]) / 255 / (double)TXP_TONE_UNIT *
                         (double)u->most_weight / (double)u->kinds[map].weight;
     return TXM_OK;
 }

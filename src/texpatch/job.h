@@ -17,12 +17,14 @@ typedef struct txp_step {
     float cost; /* approximate, relative to other steps */
 } txp_step;
 
-/* Where pixels come from. */
+/* Where pixels come from, and what is done to them. */
 typedef struct txp_origins {
     txp_place *at;
-    float *bend; /* x, y by which each pixel's place is moved                                   */
-    float *tone; /* what is added to each compared byte, txp_lanes of them                      */
+    int16_t *bend; /* x, y by which each pixel's place is moved, times TXP_BEND_UNIT             */
+    int16_t *tone; /* what is added to each compared byte, txp_lanes of them, times TXP_TONE_UNIT */
 } txp_origins;
+#define TXP_BEND_UNIT 2048.0f /* of a pixel; pieces are bent by some pixels                        */
+#define TXP_TONE_UNIT 256.0f  /* of a gray level; tones change by up to TXP_LARGE_STEP             */
 
 /* What is known of a canvas before the work begins, per pixel of its full size; NULL: nothing. */
 typedef struct txp_given {
@@ -45,8 +47,7 @@ struct texpatch_job {
     int level; /* that the canvas has now; -1: none yet                             */
     txm_arena canvas_memory, finish_memory; /* of the canvas; of bend and tone                   */
     txp_canvas canvas;
-    float *bend; /* x, y by which each pixel's place is moved; NULL: not yet           */
-    float *tone; /* what is added to each compared byte, txp_lanes of them             */
+    int16_t *bend, *tone; /* as in txp_origins; NULL: not yet                          */
     txp_given given;
     uint64_t seed;
     /* a part that is being made again lies at (part_x, part_y) of the canvas */
@@ -72,8 +73,8 @@ static inline txp_origins txp_origins_of(const texpatch_job *job) {
 static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
                                     size_t k, size_t count, size_t lanes) {
     memcpy(to->at + i, from->at + k, count * sizeof *to->at);
-    memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof(float));
-    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof(float));
+    memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof *to->bend);
+    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof *to->tone);
 }
 
 /* The next step; there is room for two windows on all levels, 16 passes each, the quilt, polishing twice

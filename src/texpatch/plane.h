@@ -109,8 +109,8 @@ static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int 
     if (status == TXM_OK) {
         txp_origins *o = &p->from;
         o->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *o->at);
-        o->bend = (float *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof(float));
-        o->tone = (float *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof(float));
+        o->bend = (int16_t *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof *o->bend);
+        o->tone = (int16_t *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof *o->tone);
         if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }

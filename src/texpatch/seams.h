@@ -106,75 +106,79 @@ static inline void txp_add_jump(const txp_field *f, size_t i, size_t j, size_t l
 
 typedef struct txp_seams {
     const txp_source *source;
-    const txp_canvas *canvas;
-    txp_field *bend, *tone;
-    int first_band;
+    txp_field *bend, *tone; /* over the same rows                                             */
+    int first_row;          /* of the first band, a multiple of TXP_BAND                       */
 } txp_seams;
 
-/* Measure the seams to the right of and below the pixels of a band, and set the jumps of the two
-   fields: bend (x, y) and tone (compared bytes). The step of colour at a seam is the difference of
-   both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large ones are
-   edges of something. Pulls are stored with the first of the two pixels. */
+/* Measure the seam between pixel (x, y) of the fields and its right (d = 0) or lower neighbour (qx, qy),
+   and set the jumps of the two fields: bend (x, y) and tone (compared bytes). a, q: what both show. */
+static void txp_measure_seam(const txp_seams *m, txp_seam *seams, int x, int y, int qx, int qy, int d,
+                             txp_place a, txp_place q) {
+    const txp_source *s = m->source;
+    const txp_stack *k = &s->stack[0];
+    const size_t w = (size_t)m->bend->canvas->width;
+    const size_t i = (size_t)y * w + (size_t)x, j = (size_t)qy * w + (size_t)qx;
+    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25; /* summed over 5 x 5 pixels */
+    uint8_t *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
+    int shift[2];
+    *bend = *tone = 255;
+    if (a.x < 0 || q.x < 0) {
+        *bend = *tone = TXP_PULL_SEAM;
+        return;
+    }
+    a.x += !d;
+    a.y += d;
+    if (a.x == q.x && a.y == q.y) return;
+    *bend = txp_seam_cached(s, seams, x, m->bend->top + y, a, q, shift) ? 255 : TXP_PULL_FITS;
+    *tone = TXP_PULL_SEAM;
+    const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2, by = q.y + shift[1] - 2;
+    int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
+    if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
+        const txp_place from_a = {ax, ay};
+        const txp_place from_b = {bx, by};
+        txp_seam_step(s, k, from_a, from_b, sum);
+        for (int b = 0; b < s->guide_at; b++) most = abs(sum[b]) > most ? abs(sum[b]) : most;
+        if (most < low) *tone = 255;
+        else if (most < high)
+            *tone = (uint8_t)(TXP_PULL_SEAM + (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
+    }
+    if (shift[0] || shift[1]) {
+        txp_field_mark(m->bend, x, y);
+        txp_field_mark(m->bend, qx, qy);
+    }
+    if (most > 0 && most < high) {
+        txp_field_mark(m->tone, x, y);
+        txp_field_mark(m->tone, qx, qy);
+    }
+    /* u(q) - u(i) = jump: added to q, subtracted from i */
+    for (size_t b = 0; b < 2; b++)
+        txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
+    for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
+        txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
+}
+
+/* Measure the seams to the right of and below the pixels of a band. The step of colour at a seam is the
+   difference of both pieces in the 5 x 5 pixels around it; small steps are differences of tone, large
+   ones are edges of something. Pulls are stored with the first of the two pixels. */
 static void txp_measure_band(void *context, int lane) {
     const txp_seams *m = (const txp_seams *)context;
-    const txp_source *s = m->source;
-    const txp_canvas *c = m->canvas;
-    const txp_stack *k = &s->stack[0];
-    const int top = (m->first_band + 2 * lane) * TXP_BAND;
-    const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
-    /* summed over 5 x 5 pixels */
-    const int low = TXP_SMALL_STEP * 25, high = TXP_LARGE_STEP * 25;
+    const txp_field *f = m->bend;
+    const txp_canvas *c = f->canvas;
+    const int top = m->first_row + 2 * lane * TXP_BAND;
+    const int bottom = top + TXP_BAND < f->height ? top + TXP_BAND : f->height;
     txp_seam seams[TXP_SEAM_CACHE];
     memset(seams, 0, sizeof seams);
     for (int y = top; y < bottom; y++) {
+        const int below = f->closed && y + 1 == f->height ? 0 : y + 1;
+        const int row = txp_field_row(f, y), next = txp_field_row(f, below);
+        if (row < 0) continue;
         for (int x = 0; x < c->width; x++) {
-            const size_t i = txp_index(c, x, y);
-            for (int d = 0; d < 2; d++) {
-                uint8_t *bend = &m->bend->pull[d][i], *tone = &m->tone->pull[d][i];
-                int qx = x + !d, qy = y + d, shift[2];
-                *bend = *tone = 255;
-                if (qx >= c->width) qx = 0;
-                if (qy >= c->height) qy = 0;
-                txp_place a = c->at[i];
-                const txp_place q = c->at[txp_index(c, qx, qy)];
-                if (a.x < 0 || q.x < 0) {
-                    *bend = *tone = TXP_PULL_SEAM;
-                    continue;
-                }
-                a.x += !d;
-                a.y += d;
-                if (a.x == q.x && a.y == q.y) continue;
-                if (!txp_seam_cached(s, seams, x, y, a, q, shift)) *bend = TXP_PULL_FITS;
-                *tone = TXP_PULL_SEAM;
-                const int ax = a.x - 2, ay = a.y - 2, bx = q.x + shift[0] - 2,
-                          by = q.y + shift[1] - 2;
-                int sum[TEXPATCH_MAX_CHANNELS] = {0}, most = 0;
-                if (txp_fits(s, k, ax, ay, 5, 5) && txp_fits(s, k, bx, by, 5, 5)) {
-                    const txp_place from_a = {ax, ay};
-                    const txp_place from_b = {bx, by};
-                    txp_seam_step(s, k, from_a, from_b, sum);
-                    for (int b = 0; b < s->guide_at; b++)
-                        most = abs(sum[b]) > most ? abs(sum[b]) : most;
-                    if (most < low) *tone = 255;
-                    else if (most < high)
-                        *tone = (uint8_t)(TXP_PULL_SEAM +
-                                          (255 - TXP_PULL_SEAM) * (high - most) / (high - low));
-                }
-                /* u(q) - u(i) = jump: added to q, subtracted from i */
-                const size_t j = txp_index(c, qx, qy);
-                if (shift[0] || shift[1]) {
-                    txp_field_mark(m->bend, x, y);
-                    txp_field_mark(m->bend, qx, qy);
-                }
-                if (most > 0 && most < high) {
-                    txp_field_mark(m->tone, x, y);
-                    txp_field_mark(m->tone, qx, qy);
-                }
-                for (size_t b = 0; b < 2; b++)
-                    txp_add_jump(m->bend, i, j, b, *bend * shift[b] * TXP_JUMP_UNIT / 255);
-                for (size_t b = 0; b < (size_t)s->guide_at && most < high; b++)
-                    txp_add_jump(m->tone, i, j, b, *tone * sum[b] * TXP_JUMP_UNIT / (25 * 255));
-            }
+            const txp_place a = c->at[txp_index(c, x, row)];
+            const int right = x + 1 < c->width ? x + 1 : c->wrap & TEXPATCH_TILE_X ? 0 : -1;
+            if (right >= 0)
+                txp_measure_seam(m, seams, x, y, right, y, 0, a, c->at[txp_index(c, right, row)]);
+            if (next >= 0)
+                txp_measure_seam(m, seams, x, y, x, below, 1, a, c->at[txp_index(c, x, next)]);
         }
     }
 }

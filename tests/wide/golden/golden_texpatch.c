@@ -42,6 +42,18 @@ static uint64_t tileable(txm_env *env) {
     return make(&desc, 3, env);
 }
 
+/* more rows than are finished at a time */
+static uint64_t tall(txm_env *env) {
+    golden_noise(exemplar[0], SIDE, SIDE, 1);
+    const txm_image map = golden_image(exemplar[0], SIDE, SIDE, 1, TXM_U8);
+    const texpatch_exemplar e = one_exemplar(&map);
+    texpatch_desc desc = describe(&e, 1, 1);
+    desc.width = 33;
+    desc.height = 601;
+    desc.tileable = TEXPATCH_TILE_X | TEXPATCH_TILE_Y;
+    return make(&desc, 1, env);
+}
+
 static uint64_t turned(txm_env *env) {
     golden_noise(exemplar[0], SIDE, SIDE, 1);
     const txm_image map = golden_image(exemplar[0], SIDE, SIDE, 1, TXM_U8);
@@ -276,7 +288,7 @@ static uint64_t half(txm_env *env) {
 }
 
 static const golden_case cases[] = {
-    {"tileable", tileable}, {"turned", turned}, {"lattice", lattice}, {"lattice-given", lattice_given},
+    {"tileable", tileable}, {"tall", tall}, {"turned", turned}, {"lattice", lattice}, {"lattice-given", lattice_given},
     {"maps", maps},         {"guided", guided}, {"again", again},     {"plane", plane},
     {"half", half},
     {"straight", straight}};
