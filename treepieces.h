@@ -293,8 +293,26 @@ typedef enum treepieces_leaf_shape {
     TREEPIECES_LEAF_LANCE,  /* willow    */
     TREEPIECES_LEAF_HEART,  /* poplar    */
     TREEPIECES_LEAF_NEEDLE, /* conifers  */
-    TREEPIECES_LEAF_BLOSSOM /* almond    */
+    TREEPIECES_LEAF_BLOSSOM, /* almond   */
+    TREEPIECES_LEAF_PALMATE, /* maple    */
+    TREEPIECES_LEAF_COMPOUND /* ash: leaflets on both sides of a stalk */
 } treepieces_leaf_shape;
+
+/* How the cards of a leaf cloud lie. */
+typedef enum treepieces_cloud_kind {
+    TREEPIECES_CLOUD_ROUND = 0, /* twigs that grow outwards in all directions, fewer inside      */
+    TREEPIECES_CLOUD_LAYERS,    /* flat sprays one above the other                               */
+    TREEPIECES_CLOUD_SHOOTS,    /* along shoots that radiate from the centre                     */
+    TREEPIECES_CLOUD_STRIPS     /* hanging strips                                                */
+} treepieces_cloud_kind;
+
+/* The drawn bark. */
+typedef enum treepieces_bark_kind {
+    TREEPIECES_BARK_FURROWED = 0, /* ridges between fissures along the stem: oak, willow          */
+    TREEPIECES_BARK_SMOOTH,       /* fine wrinkles: beech                                         */
+    TREEPIECES_BARK_LENTICELS,    /* smooth, with marks across: birch (dark), almond (pale)       */
+    TREEPIECES_BARK_PLATES        /* plates that flake off: pine                                  */
+} treepieces_bark_kind;
 
 /* A kind of tree. For the text form see treepieces_species_parse. */
 typedef struct treepieces_species {
@@ -313,8 +331,10 @@ typedef struct treepieces_species {
     int leaf_shape;   /* treepieces_leaf_shape                                                    */
     int leaf_count;   /* cards per leaf cloud, 1..256; 0 = no leaves                              */
     float leaf_size;  /* side of a card, in radii of the cloud                                    */
+    int cloud_kind;   /* treepieces_cloud_kind                                                    */
     float cloud;      /* radius of a leaf cloud, metres                                           */
     float cloud_flat; /* height of a cloud over its width, 0.1..2                                 */
+    int bark_kind;    /* treepieces_bark_kind                                                     */
     float leaf_color[3], bark_color[3]; /* sRGB 0..1: tint of the drawn leaves and bark           */
 } treepieces_species;
 
@@ -689,7 +709,8 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
 
 /* The leaf cards of a tree as a mesh, for renderers without impostors: two triangles per card,
    bound to the bone of its cluster. joints and weights as in treepieces_bake. looks: how many
-   different clouds are used, 1..64; a cluster takes cloud number look mod looks. */
+   different clouds are used, 1..64; a cluster takes cloud number look mod looks, turned about y by
+   2 pi (look >> 8 & 255) / 256. Normals point out of the crown, more or less. */
 TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
                                                  const float *bones, int looks, txm_env *env,
                                                  treepieces_mesh **out);
@@ -1468,7 +1489,7 @@ TREEPIECES_API const treepieces_piece *treepieces_kit_piece(const treepieces_kit
 /* ---- species: fields --------------------------------------------------------------------- */
 
 /* One table drives reading, printing and checking. */
-typedef enum tpc_kind { TPC_REAL, TPC_WHOLE, TPC_ENVELOPE, TPC_LEAF } tpc_kind;
+typedef enum tpc_kind { TPC_REAL, TPC_WHOLE, TPC_ENVELOPE, TPC_LEAF, TPC_CLOUD, TPC_BARK } tpc_kind;
 
 typedef struct tpc_field {
     const char *key;
@@ -1494,11 +1515,13 @@ static const tpc_field tpc_fields[] = {
     TPC_FIELD(shade, TPC_REAL, 1, 0, 1e6f),
     TPC_FIELD(clearance, TPC_REAL, 1, 0, 10),
     TPC_FIELD(stiffness, TPC_REAL, 1, 0.01f, 100),
-    TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_BLOSSOM),
+    TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_COMPOUND),
     TPC_FIELD(leaf_count, TPC_WHOLE, 1, 0, 256),
     TPC_FIELD(leaf_size, TPC_REAL, 1, 0.01f, 4),
+    TPC_FIELD(cloud_kind, TPC_CLOUD, 1, 0, TREEPIECES_CLOUD_STRIPS),
     TPC_FIELD(cloud, TPC_REAL, 1, 0.001f, 20),
     TPC_FIELD(cloud_flat, TPC_REAL, 1, 0.1f, 2),
+    TPC_FIELD(bark_kind, TPC_BARK, 1, 0, TREEPIECES_BARK_PLATES),
     TPC_FIELD(leaf_color, TPC_REAL, 3, 0, 1),
     TPC_FIELD(bark_color, TPC_REAL, 3, 0, 1),
 };
@@ -1539,15 +1562,19 @@ enum {
     TPC_NUMBER = 24 /* room for a number as text */
 };
 
-/* by treepieces_envelope and treepieces_leaf_shape */
+/* by treepieces_envelope, treepieces_leaf_shape, treepieces_cloud_kind and treepieces_bark_kind */
 static const char *const tpc_envelope_names[] = {"free", "ellipsoid", "cone", "cylinder", NULL};
-static const char *const tpc_leaf_names[] = {"oval",  "lobed",  "lance", "heart",
-                                             "needle", "blossom", NULL};
+static const char *const tpc_leaf_names[] = {"oval",   "lobed",   "lance",   "heart",   "needle",
+                                             "blossom", "palmate", "compound", NULL};
+static const char *const tpc_cloud_names[] = {"round", "layers", "shoots", "strips", NULL};
+static const char *const tpc_bark_names[] = {"furrowed", "smooth", "lenticels", "plates", NULL};
 
 /* The names of the values of a field; NULL: they are numbers. */
 static const char *const *tpc_names_of(const tpc_field *f) {
     return f->kind == TPC_ENVELOPE ? tpc_envelope_names
            : f->kind == TPC_LEAF   ? tpc_leaf_names
+           : f->kind == TPC_CLOUD  ? tpc_cloud_names
+           : f->kind == TPC_BARK   ? tpc_bark_names
                                    : NULL;
 }
 
@@ -1745,7 +1772,9 @@ static const char tpc_fresh[] =
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
     "clearance 1.2\n"
     "stiffness 1\n"
-    "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud 0.5\n" "cloud_flat 0.8\n"
+    "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud_kind round\n" "cloud 0.5\n"
+    "cloud_flat 0.8\n"
+    "bark_kind furrowed\n"
     "leaf_color 0.3 0.45 0.15\n" "bark_color 0.4 0.35 0.3\n"
     "order 0\n" "length 8\n" "length_spread 0.1\n" "radius 0.025\n" "taper 0.25\n" "segments 12\n"
     "start 0.25\n" "side 0.45\n" "pair 0.1\n" "fork 0.12\n" "triple 0\n" "fork_angle 25\n"
@@ -1768,15 +1797,15 @@ static const char tpc_fresh[] =
 
 static const char tpc_oak[] =
     "name oak\n" "flare 1.7\n" "stiffness 1.4\n"
-    "envelope ellipsoid\n" "crown_base 0.08\n" "crown_top 1.12\n" "crown_width 1.35\n"
-    "leaf_shape lobed\n" "leaf_count 40\n" "leaf_size 0.4\n" "cloud 0.85\n" "cloud_flat 0.8\n"
+    "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 1.45\n"
+    "leaf_shape lobed\n" "leaf_count 28\n" "leaf_size 0.42\n" "cloud 1.2\n" "cloud_flat 0.8\n"
     "leaf_color 0.29 0.4 0.13\n" "bark_color 0.4 0.35 0.29\n"
     "order 0\n" "length 15\n" "radius 0.034\n" "taper 0.05\n" "segments 15\n"
     "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.35\n" "fork_angle 30\n" "fork_ratio 0.95\n"
     "wander 9\n" "tropism 0.03\n" "leaves 0.9\n" "leaves_start 0.85\n"
-    "order 1\n" "length 0.6\n" "length_spread 0.2\n" "radius 0.55\n" "taper 0.06\n" "segments 11\n"
+    "order 1\n" "length 0.72\n" "length_spread 0.2\n" "radius 0.55\n" "taper 0.06\n" "segments 12\n"
     "start 0.15\n" "side 0.5\n" "pair 0.05\n" "fork 0.22\n" "fork_angle 28\n"
-    "angle_base 78\n" "angle_top 45\n" "angle_spread 10\n" "profile 1.1 1 0.6\n" "roll 137.5\n"
+    "angle_base 80\n" "angle_top 40\n" "angle_spread 10\n" "profile 1 1 0.75\n" "roll 137.5\n"
     "wander 15\n" "tropism 0.06\n" "leaves 0.7\n" "leaves_start 0.5\n"
     "order 2\n" "gravimorphism 0.5\n"
     "length 0.45\n" "radius 0.5\n" "taper 0.1\n" "segments 7\n"
@@ -1792,12 +1821,14 @@ static const char tpc_oak[] =
 
 static const char tpc_beech[] =
     "name beech\n" "flare 1.8\n" "stiffness 1.2\n"
-    "leaf_shape oval\n" "leaf_count 44\n" "leaf_size 0.36\n" "cloud 1\n" "cloud_flat 0.6\n"
-    "leaf_color 0.28 0.39 0.14\n" "bark_color 0.52 0.51 0.47\n"
+    "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 0.95\n"
+    "leaf_shape oval\n" "leaf_count 30\n" "leaf_size 0.45\n" "cloud_kind layers\n" "cloud 1.25\n"
+    "cloud_flat 0.5\n"
+    "leaf_color 0.28 0.39 0.14\n" "bark_kind smooth\n" "bark_color 0.47 0.48 0.46\n"
     "order 0\n" "length 20\n" "radius 0.024\n" "taper 0.04\n" "segments 26\n"
     "start 0.14\n" "side 0.8\n" "pair 0.05\n" "fork 0.08\n" "fork_angle 20\n" "fork_ratio 0.95\n"
     "wander 4\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
-    "order 1\n" "length 0.55\n" "radius 0.42\n" "taper 0.05\n" "segments 13\n"
+    "order 1\n" "length 0.6\n" "radius 0.42\n" "taper 0.05\n" "segments 13\n"
     "start 0.12\n" "side 0.7\n" "pair 0.05\n" "fork 0.1\n" "fork_angle 22\n"
     "angle_base 66\n" "angle_top 28\n" "angle_spread 8\n" "profile 1 1 0.4\n"
     "wander 8\n" "tropism 0.05\n" "leaves 0.8\n" "leaves_start 0.5\n"
@@ -1811,7 +1842,8 @@ static const char tpc_beech[] =
 
 static const char tpc_maple[] =
     "name maple\n" "flare 1.5\n"
-    "leaf_shape lobed\n" "leaf_count 44\n" "leaf_size 0.42\n" "cloud 0.8\n" "cloud_flat 0.8\n"
+    "envelope ellipsoid\n" "crown_base 0.12\n" "crown_top 1.1\n" "crown_width 0.85\n"
+    "leaf_shape palmate\n" "leaf_count 28\n" "leaf_size 0.42\n" "cloud 1.1\n" "cloud_flat 0.85\n"
     "leaf_color 0.74 0.4 0.12\n" "bark_color 0.42 0.38 0.33\n"
     "order 0\n" "length 15\n" "radius 0.02\n" "taper 0.05\n" "segments 20\n"
     "start 0.16\n" "side 0.1\n" "pair 0.5\n" "fork 0.14\n" "fork_angle 20\n" "fork_ratio 0.95\n"
@@ -1830,10 +1862,11 @@ static const char tpc_maple[] =
 
 static const char tpc_birch[] =
     "name birch\n" "flare 1.3\n" "stiffness 0.7\n"
-    "leaf_shape heart\n" "leaf_count 30\n" "leaf_size 0.34\n" "cloud 0.55\n" "cloud_flat 1.1\n"
-    "leaf_color 0.4 0.52 0.16\n" "bark_color 0.85 0.83 0.79\n"
+    "envelope ellipsoid\n" "crown_base 0.1\n" "crown_top 1.12\n" "crown_width 0.5\n"
+    "leaf_shape heart\n" "leaf_count 15\n" "leaf_size 0.5\n" "cloud 0.75\n" "cloud_flat 1.3\n"
+    "leaf_color 0.4 0.52 0.16\n" "bark_kind lenticels\n" "bark_color 0.85 0.83 0.79\n"
     "order 0\n" "length 18\n" "radius 0.01\n" "taper 0.03\n" "segments 38\n"
-    "start 0.14\n" "side 0.85\n" "pair 0.05\n" "fork 0.01\n" "fork_angle 14\n"
+    "start 0.14\n" "side 0.9\n" "pair 0.05\n" "fork 0\n"
     "wander 3\n" "tropism 0.12\n" "leaves 0.9\n" "leaves_start 0.9\n"
     "order 1\n" "length 0.34\n" "radius 0.36\n" "taper 0.06\n" "segments 11\n"
     "start 0.1\n" "side 0.9\n" "fork 0.02\n"
@@ -1848,7 +1881,7 @@ static const char tpc_birch[] =
 
 static const char tpc_poplar[] =
     "name poplar\n" "flare 1.5\n" "stiffness 0.9\n"
-    "leaf_shape heart\n" "leaf_count 36\n" "leaf_size 0.36\n" "cloud 0.6\n" "cloud_flat 1.3\n"
+    "leaf_shape heart\n" "leaf_count 26\n" "leaf_size 0.45\n" "cloud 0.85\n" "cloud_flat 1.4\n"
     "leaf_color 0.3 0.44 0.14\n" "bark_color 0.45 0.42 0.36\n"
     "order 0\n" "length 24\n" "radius 0.013\n" "taper 0.03\n" "segments 50\n"
     "start 0.04\n" "side 0.6\n" "pair 0.4\n" "fork 0\n"
@@ -1865,11 +1898,12 @@ static const char tpc_poplar[] =
 
 static const char tpc_willow[] =
     "name willow\n" "flare 1.6\n" "stiffness 0.6\n"
-    "leaf_shape lance\n" "leaf_count 36\n" "leaf_size 0.42\n" "cloud 0.9\n" "cloud_flat 2\n"
+    "leaf_shape lance\n" "leaf_count 16\n" "leaf_size 0.9\n" "cloud_kind strips\n" "cloud 1.1\n"
+    "cloud_flat 2\n"
     "leaf_color 0.42 0.5 0.18\n" "bark_color 0.42 0.37 0.29\n"
     "order 0\n" "length 10\n" "radius 0.042\n" "taper 0.08\n" "segments 13\n"
-    "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.4\n" "fork_angle 30\n" "fork_ratio 0.95\n"
-    "wander 8\n" "tropism 0.03\n"
+    "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.4\n" "fork_angle 32\n" "fork_ratio 0.85\n"
+    "wander 8\n" "tropism 0.03\n" "leaves 0.5\n" "leaves_start 0.7\n"
     "order 1\n" "length 0.62\n" "radius 0.5\n" "taper 0.1\n" "segments 10\n"
     "start 0.15\n" "side 0.65\n" "pair 0.3\n" "fork 0.06\n"
     "angle_base 60\n" "angle_top 40\n" "profile 1 1 0.7\n"
@@ -1884,8 +1918,8 @@ static const char tpc_willow[] =
 
 static const char tpc_almond[] =
     "name almond\n" "flare 1.4\n"
-    "leaf_shape blossom\n" "leaf_count 34\n" "leaf_size 0.3\n" "cloud 0.38\n" "cloud_flat 0.9\n"
-    "leaf_color 0.94 0.76 0.8\n" "bark_color 0.3 0.25 0.22\n"
+    "leaf_shape blossom\n" "leaf_count 30\n" "leaf_size 0.4\n" "cloud 0.5\n" "cloud_flat 0.9\n"
+    "leaf_color 0.94 0.76 0.8\n" "bark_kind lenticels\n" "bark_color 0.3 0.25 0.22\n"
     "order 0\n" "length 5.5\n" "radius 0.026\n" "taper 0.06\n" "segments 14\n"
     "start 0.2\n" "side 0.35\n" "fork 0.42\n" "triple 0.1\n" "fork_angle 32\n" "fork_ratio 0.95\n"
     "wander 8\n" "tropism 0.1\n" "leaves 0.7\n" "leaves_start 0.6\n"
@@ -1901,8 +1935,9 @@ static const char tpc_almond[] =
 
 static const char tpc_pine[] =
     "name pine\n" "flare 1.4\n"
-    "leaf_shape needle\n" "leaf_count 40\n" "leaf_size 0.5\n" "cloud 0.8\n" "cloud_flat 0.4\n"
-    "leaf_color 0.24 0.35 0.19\n" "bark_color 0.55 0.36 0.24\n"
+    "leaf_shape needle\n" "leaf_count 30\n" "leaf_size 0.42\n" "cloud_kind shoots\n" "cloud 1\n"
+    "cloud_flat 0.5\n"
+    "leaf_color 0.24 0.35 0.19\n" "bark_kind plates\n" "bark_color 0.55 0.36 0.24\n"
     "order 0\n" "length 19\n" "radius 0.0155\n" "taper 0.06\n" "segments 30\n"
     "start 0.42\n" "side 0.3\n" "pair 0.6\n" "fork 0.05\n" "fork_angle 22\n"
     "wander 4\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
@@ -1920,8 +1955,9 @@ static const char tpc_pine[] =
 
 static const char tpc_spruce[] =
     "name spruce\n" "flare 1.4\n"
-    "leaf_shape needle\n" "leaf_count 16\n" "leaf_size 0.8\n" "cloud 0.46\n" "cloud_flat 0.55\n"
-    "leaf_color 0.2 0.31 0.19\n" "bark_color 0.38 0.3 0.25\n"
+    "leaf_shape needle\n" "leaf_count 16\n" "leaf_size 0.75\n" "cloud_kind layers\n" "cloud 0.6\n"
+    "cloud_flat 0.5\n"
+    "leaf_color 0.2 0.31 0.19\n" "bark_kind plates\n" "bark_color 0.38 0.3 0.25\n"
     "order 0\n" "length 22\n" "radius 0.014\n" "taper 0.03\n" "segments 64\n"
     "start 0.04\n" "side 0.05\n" "pair 0.95\n" "fork 0\n"
     "wander 1\n" "tropism 0.3\n" "leaves 1\n" "leaves_start 0.96\n"
@@ -4345,41 +4381,71 @@ static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t 
     return 0.5f + (outside * frame + inside * own) / sqrtf(inside * inside + outside * outside);
 }
 
-/* Brightness of bark, about 1: plates between fissures along the stem. The fissures cross the frame
-   at the same places in all tiles and wander in between, so that the frame is not visible. */
-static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
-    enum { PLATES = 3, CRACKS = 2 }; /* across and along a tile */
-    const float slow = tpc_framed_noise(x, y, 4, 3, seed + 1000, number) - 0.5f;
-    const float quick = tpc_framed_noise(x, y, 9, 7, seed + 2000, number) - 0.5f;
-    const float grain = tpc_framed_noise(x, y, 32, 11, seed + 3000, number) - 0.5f;
-    const float across = (float)PLATES * (1 + x) + 0.9f * slow + 0.25f * quick + 0.25f * grain;
-    const int plate = (int)across;
-    const float f = across - (float)plate, edge = txm_minf(f, 1 - f);
-    const float gap = 0.1f + 0.3f * tpc_framed_noise(x, y, 6, 3, seed + 4000, number);
-    /* cracks across a plate, at heights that differ from plate to plate */
-    const uint64_t own = txm_hash(seed + 9000 + (uint64_t)(plate % PLATES));
-    const float bend = tpc_framed_noise(x, y, 3, 4, seed + 5000, number) - 0.5f;
-    const float along = (float)CRACKS * (1 + y) + (float)(own >> 60) / 16 + 0.9f * bend;
-    const float g = along - (float)(int)along;
-    const float open = 2.4f * (tpc_framed_noise(x, y, 5, 4, seed + 6000, number) - 0.42f);
-    const float crack = tpc_fade(txm_minf(g, 1 - g) / 0.09f) * txm_clampf(open, 0, 1);
-    const float depth = txm_maxf(tpc_fade(edge / gap), 0.75f * crack);
-    /* a plate is lit from one side */
-    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick;
-    return 0.46f + top * (1 - depth) + (0.4f - 0.2f * depth) * grain;
+/* A place of a tile of bark that is being drawn. */
+typedef struct tpc_bark_place {
+    float x, y; /* in the tile, 0..1 */
+    uint64_t seed;
+    int number; /* of the tile */
+} tpc_bark_place;
+
+/* -1/2..1/2; salt: which of the noises of a bark */
+static float tpc_bark_noise(const tpc_bark_place *p, int columns, int rows, uint64_t salt) {
+    return tpc_framed_noise(p->x, p->y, columns, rows, p->seed + salt, p->number) - 0.5f;
 }
 
-/* Smooth pale bark with dark lenticels across it, as of birches; none lie on the frame, where their
-   repetition would be visible. */
-static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
-    const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
+/* Brightness of bark, about 1: ridges between fissures along the stem, grain on them. A fissure crosses
+   the frame in the middle of a tile, at the same place in all, and wanders and ends in between, so that
+   the frame is not visible. Plates: wider ones, with cracks all round, of different height. */
+static float tpc_furrowed_bark(const tpc_bark_place *p, int is_plates) {
+    const float slow = tpc_bark_noise(p, 3, 2, 1000), quick = tpc_bark_noise(p, 9, 6, 2000);
+    const float grain = tpc_bark_noise(p, 26, 8, 3000), fine = tpc_bark_noise(p, 40, 24, 3500);
+    const float across = 1.5f + p->x + 0.75f * slow + 0.16f * quick + 0.07f * grain;
+    const int ridge = (int)across;
+    const float f = across - (float)ridge, edge = txm_minf(f, 1 - f);
+    const float border = txm_minf(txm_minf(p->x, 1 - p->x), txm_minf(p->y, 1 - p->y));
+    const float inside = 1 - tpc_fade((border - 0.03f) * 4);
+    const float gap = (is_plates ? 0.09f : 0.13f) + 0.42f * inside * tpc_bark_noise(p, 4, 3, 4000);
+    /* cracks across a ridge, half a tile higher on every second one */
+    const float bend = tpc_bark_noise(p, 3, 3, 5000);
+    const float along = 1 + p->y + 0.5f * (float)(ridge & 1) + 0.7f * bend + 0.1f * quick;
+    const float g = along - (float)(int)along;
+    const float open = is_plates ? 1 : 2.4f * (tpc_bark_noise(p, 3, 3, 6000) + 0.02f);
+    const float crack = inside * tpc_fade(txm_minf(g, 1 - g) / 0.07f) * txm_clampf(open, 0, 1);
+    const float fissure = gap > 0.02f ? tpc_fade(edge / gap) : 0;
+    const float depth = txm_maxf(fissure, (is_plates ? 0.9f : 0.6f) * crack);
+    /* a ridge is lit from one side; layers that flake off have edges */
+    const float flake = is_plates ? 0.22f * tpc_fade(fabsf(slow + 0.4f * quick) * 12) : 0;
+    const float top = 0.60f + 0.22f * (0.5f - f) + 0.22f * slow + 0.2f * quick - flake;
+    return 0.45f + top * (1 - 0.85f * depth) + (0.34f - 0.2f * depth) * grain + 0.16f * fine;
+}
+
+/* Smooth bark: spots, and fine wrinkles across the stem. */
+static float tpc_smooth_bark(const tpc_bark_place *p) {
+    const float spots = tpc_bark_noise(p, 3, 4, 6000), wrinkle = tpc_bark_noise(p, 4, 22, 6500);
+    const float fine = tpc_bark_noise(p, 24, 40, 7000);
+    return 0.95f + 0.2f * spots + 0.2f * wrinkle + 0.1f * fine;
+}
+
+/* Smooth bark with lenticels across it: dark ones on pale bark, as of birches, else paler ones. None
+   lie on the frame, where their repetition would be visible. */
+static float tpc_lenticel_bark(const tpc_bark_place *p, int is_pale) {
+    const float border = txm_minf(txm_minf(p->x, 1 - p->x), txm_minf(p->y, 1 - p->y));
     const float inside = 1 - tpc_fade((border - 0.03f) * 5);
-    const uint64_t own = seed + 5000 + (uint64_t)number;
-    const float mark = tpc_noise(x, y, 3, 17, own), wide = tpc_noise(x, y, 2, 5, own + 1000);
-    const float shade = tpc_framed_noise(x, y, 3, 6, seed + 6000, number) - 0.5f;
-    const float grain = tpc_framed_noise(x, y, 20, 40, seed + 7000, number) - 0.5f;
-    const float dark = 0.55f * tpc_fade((0.9f - mark) * 9) + 0.4f * tpc_fade((0.97f - wide) * 9);
-    return 1 - inside * dark + 0.1f * grain + 0.1f * shade;
+    const uint64_t own = p->seed + 5000 + (uint64_t)p->number;
+    const float mark = tpc_noise(p->x, p->y, 2, 13, own);
+    const float wide = tpc_noise(p->x, p->y, 1, 6, own + 1000);
+    const float shade = tpc_bark_noise(p, 3, 5, 6000), grain = tpc_bark_noise(p, 20, 40, 7000);
+    const float marks = inside * (0.55f * tpc_fade((0.88f - mark) * 8) + 0.5f * tpc_fade((0.93f - wide) * 8));
+    return (is_pale ? 0.98f - marks : 0.92f + 0.6f * marks) + 0.1f * grain + 0.12f * shade;
+}
+
+static float tpc_bark_relief(const treepieces_species *species, const tpc_bark_place *p) {
+    const float *color = species->bark_color;
+    switch (species->bark_kind) {
+    case TREEPIECES_BARK_SMOOTH: return tpc_smooth_bark(p);
+    case TREEPIECES_BARK_LENTICELS: return tpc_lenticel_bark(p, color[0] + color[1] + color[2] > 1.5f);
+    default: return tpc_furrowed_bark(p, species->bark_kind == TREEPIECES_BARK_PLATES);
+    }
 }
 
 TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species, uint64_t seed,
@@ -4394,16 +4460,14 @@ TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species
             return txm_fail(env, TXM_BAD_ARGUMENT, "tiles must be square, of 3 or 4 channels");
     }
     const float *color = species->bark_color;
-    const int is_pale = color[0] + color[1] + color[2] > 2;
     for (int i = 0; i < tile_count; i++) {
         const txm_image t = txm_image_resolve(tiles[i]);
         for (int y = 0; y < t.height; y++) {
             for (int x = 0; x < t.width; x++) {
-                const float u = ((float)x + 0.5f) / (float)t.width;
-                const float v = ((float)y + 0.5f) / (float)t.height;
-                const float relief =
-                    is_pale ? tpc_birch_relief(u, v, seed, i) : tpc_bark_relief(u, v, seed, i);
-                const float moss = tpc_framed_noise(u, v, 4, 4, seed + 8000, i) - 0.5f;
+                const tpc_bark_place p = {((float)x + 0.5f) / (float)t.width,
+                                          ((float)y + 0.5f) / (float)t.height, seed, i};
+                const float relief = tpc_bark_relief(species, &p);
+                const float moss = tpc_bark_noise(&p, 4, 4, 8000);
                 const float tint[4] = {1 - 0.08f * moss, 1 + 0.05f * moss, 1 - 0.1f * moss, 1};
                 for (int c = 0; c < t.channels; c++)
                     txm_image_set(&t, x, y, c,
@@ -4422,9 +4486,10 @@ static float tpc_signed(txm_rng *rng) {
 }
 
 /* Orient a card: its image grows along `along`, and its face is turned to `facing` as far as that
-   allows. outward: normal of the cloud's surface there. */
+   allows. outward: normal of the cloud's surface there; the card is shaded as part of that surface,
+   but mostly as the twig that it shows. */
 static void tpc_orient_card(treepieces_card *card, float along[3], float facing[3],
-                         const float outward[3], float half) {
+                            const float outward[3], float wide, float high) {
     tpc_unit_or(along, 1, 0, 0);
     const float share = tpc_dot(facing, along);
     for (int k = 0; k < 3; k++) facing[k] -= share * along[k];
@@ -4436,10 +4501,11 @@ static void tpc_orient_card(treepieces_card *card, float along[3], float facing[
     tpc_unit_or(facing, 1, 0, 0);
     float right[3];
     tpc_cross(along, facing, right);
+    const float side = tpc_dot(facing, outward) < 0 ? -0.7f : 0.7f;
     for (int k = 0; k < 3; k++) {
-        card->right[k] = half * right[k];
-        card->up[k] = half * along[k];
-        card->normal[k] = outward[k] + 0.6f * facing[k];
+        card->right[k] = wide * right[k];
+        card->up[k] = high * along[k];
+        card->normal[k] = 0.7f * outward[k] + side * facing[k];
     }
     tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }
@@ -4495,69 +4561,120 @@ static void tpc_far_place(const treepieces_card *cards, int taken, const float s
     }
 }
 
-/* Broad leaves: cards distributed in the cloud, drooping as the leaf shape asks for. */
-static void tpc_leafy_card(const treepieces_species *species, treepieces_card *cards, int index,
-                           const float scale[3], float half, txm_rng *rng) {
-    const int is_lance = species->leaf_shape == TREEPIECES_LEAF_LANCE;
-    const int is_blossom = species->leaf_shape == TREEPIECES_LEAF_BLOSSOM;
-    const float droop = is_lance ? 1.2f : is_blossom ? 0 : 0.35f, loose = is_lance ? 0.3f : 0.8f;
-    const float reach = txm_maxf(1 - half, 0.05f);
-    const float size[3] = {reach * scale[0], reach * scale[1], reach * scale[2]};
+/* What the cards of a cloud have in common. */
+typedef struct tpc_cloud {
+    int kind, count;
+    float scale[3], half; /* of the cloud; half the side of a card */
+    float phase;          /* radians, random                       */
+    uint32_t seed;        /* of what belongs to no single card     */
+    float droop;          /* of twigs                              */
+    txm_rng rng;
+} tpc_cloud;
+
+/* Twigs that grow outwards, most of them near the surface. Layers: they spread horizontally. */
+static void tpc_twig_card(tpc_cloud *c, treepieces_card *cards, int index) {
+    const int is_flat = c->kind == TREEPIECES_CLOUD_LAYERS;
+    const float half = c->half * (0.8f + 0.35f * txm_rng_float(&c->rng));
+    const float reach = txm_maxf(1 - 0.8f * c->half, 0.05f);
+    const float size[3] = {reach * c->scale[0], reach * c->scale[1], reach * c->scale[2]};
     float place[3] = {0, 0, 0}, outward[3], along[3], facing[3];
-    tpc_far_place(cards, index, size, rng, place);
+    tpc_far_place(cards, index, size, &c->rng, place);
+    /* thinner inside, and a surface that is not a sphere */
+    const float radius = sqrtf(tpc_dot(place, place));
+    const float further = (1.5f - 0.5f * radius) * (0.84f + 0.16f * txm_rng_float(&c->rng));
     for (int k = 0; k < 3; k++) {
-        cards[index].center[k] = size[k] * place[k];
-        outward[k] = place[k] / scale[k];
+        cards[index].center[k] = size[k] * place[k] * further;
+        outward[k] = place[k] / c->scale[k];
     }
     tpc_unit_or(outward, 0, 1, 0);
     for (int k = 0; k < 3; k++) {
-        along[k] = 0.45f * outward[k] + loose * tpc_signed(rng) - (k == 1 ? droop : 0);
-        facing[k] = 0.7f * outward[k] + 0.7f * tpc_signed(rng) + (k == 1 ? 0.4f : 0);
+        along[k] = 0.9f * outward[k] + 0.5f * tpc_signed(&c->rng);
+        facing[k] = 0.35f * outward[k] + (is_flat ? 0.45f : 0.7f) * tpc_signed(&c->rng);
     }
-    tpc_orient_card(&cards[index], along, facing, outward, half);
+    if (is_flat) along[1] *= 0.35f;
+    along[1] -= c->droop;
+    facing[1] += is_flat ? 1.1f : 0.6f;
+    tpc_orient_card(&cards[index], along, facing, outward, half, half);
 }
 
-/* Needles: rows of cards along twigs that radiate from the centre, turned alternately about them. */
-static void tpc_needle_card(int index, int count, float phase, const float scale[3], float half,
-                            txm_rng *rng, treepieces_card *card) {
-    const float reach = txm_maxf(1 - half, 0);
-    const float fit = 0.7f * reach / txm_maxf(half, 0.01f) + 0.95f; /* overlapping by half */
+/* Rows of cards along shoots that radiate from the centre and turn upwards, turned alternately about
+   them. */
+static void tpc_shoot_card(tpc_cloud *c, treepieces_card *cards, int index) {
+    const float reach = txm_maxf(1 - c->half, 0);
+    const float fit = 0.7f * reach / txm_maxf(c->half, 0.01f) + 0.95f; /* overlapping by half */
     const int most = txm_clampi((int)txm_minf(fit, 4), 1, 4);
-    const int twigs = (count + most - 1) / most, steps = (count + twigs - 1) / twigs;
-    const int step = index / twigs;
-    const float place = ((float)step + 0.5f + 0.5f * txm_rng_float(rng)) / (float)steps;
-    const float roll = (float)((index % twigs + step) % 3 - 1);
+    const int shoots = (c->count + most - 1) / most, steps = (c->count + shoots - 1) / shoots;
+    const int step = index / shoots;
+    const float place = ((float)step + 0.5f + 0.5f * txm_rng_float(&c->rng)) / (float)steps;
+    const float roll = (float)((index % shoots + step) % 3 - 1);
+    treepieces_card *card = &cards[index];
     float along[3], facing[3], outward[3];
-    tpc_sphere_direction(index % twigs, twigs, phase, rng, along);
+    tpc_sphere_direction(index % shoots, shoots, c->phase, &c->rng, along);
     const float at = reach * (0.3f + 0.7f * place);
-    for (int k = 0; k < 3; k++) along[k] *= scale[k];
+    for (int k = 0; k < 3; k++) along[k] *= c->scale[k];
     tpc_unit_or(along, 1, 0, 0);
     for (int k = 0; k < 3; k++) {
-        card->center[k] = at * along[k];
+        card->center[k] = at * along[k] * (k == 1 ? txm_minf(1, 1.6f * c->scale[1]) : 1);
         outward[k] = along[k] + (k == 1 ? 0.35f : 0);
     }
     tpc_unit_or(outward, 0, 1, 0);
-    for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(rng);
-    /* across the twig, horizontal */
-    facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(rng);
+    for (int k = 0; k < 3; k++) along[k] += 0.25f * tpc_signed(&c->rng);
+    along[1] += 0.35f;
+    /* across the shoot, horizontal */
+    facing[0] = -1.2f * roll * along[2] + 0.2f * tpc_signed(&c->rng);
     facing[1] = 1;
-    facing[2] = 1.2f * roll * along[0] + 0.2f * tpc_signed(rng);
-    tpc_orient_card(card, along, facing, outward, half);
+    facing[2] = 1.2f * roll * along[0] + 0.2f * tpc_signed(&c->rng);
+    tpc_orient_card(card, along, facing, outward, c->half, c->half);
+}
+
+/* Columns of narrow hanging cards, one below the other, that begin and end at different heights. */
+static void tpc_strip_card(tpc_cloud *c, treepieces_card *cards, int index) {
+    enum { ROWS = 2 };
+    const int columns = (c->count + ROWS - 1) / ROWS, column = index % columns, row = index / columns;
+    const float share = ((float)column + 0.5f) / (float)columns;
+    const float ring = sqrtf(share) * txm_maxf(c->scale[0] - 0.3f * c->half, 0.05f);
+    const uint64_t own = txm_hash(c->seed + (uint64_t)column); /* of the column */
+    const float high = c->half * (0.75f + 0.5f * (float)(own >> 52) / 4096);
+    const float hang = txm_maxf(2 * c->scale[1] - 2.4f * high, 0) * (float)(own >> 40 & 4095) / 4096;
+    double sine, cosine;
+    float along[3], facing[3], outward[3];
+    txm_sincos((double)c->phase + 2.399963229728653 * column, &sine, &cosine);
+    treepieces_card *card = &cards[index];
+    outward[0] = (float)cosine;
+    outward[1] = 0.25f;
+    outward[2] = (float)sine;
+    tpc_unit_or(outward, 0, 1, 0);
+    card->center[0] = ring * (float)cosine + 0.1f * c->half * tpc_signed(&c->rng);
+    card->center[1] = c->scale[1] - high - hang - (row ? 0.9f : 0.1f) * high;
+    card->center[2] = ring * (float)sine + 0.1f * c->half * tpc_signed(&c->rng);
+    for (int k = 0; k < 3; k++) {
+        along[k] = 0.12f * tpc_signed(&c->rng) - (k == 1 ? 1.0f : 0);
+        facing[k] = 0.5f * outward[k] + tpc_signed(&c->rng);
+    }
+    tpc_orient_card(card, along, facing, outward, 0.5f * high, high);
 }
 
 TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t look,
                                     treepieces_card *cards) {
     const int count = species ? txm_clampi(species->leaf_count, 0, 256) : 0;
     if (!cards || !count) return count;
-    txm_rng rng = txm_rng_make(look, 0x1eaf);
-    const float phase = 6.2831853f * txm_rng_float(&rng);
     const float flat = txm_clampf(species->cloud_flat, 0.1f, 2);
-    const float half = 0.5f * txm_clampf(species->leaf_size, 0.01f, 4);
-    const float wide = txm_minf(1, 1 / flat), scale[3] = {wide, txm_minf(1, flat), wide};
+    tpc_cloud cloud;
+    cloud.kind = species->cloud_kind;
+    cloud.count = count;
+    cloud.half = 0.5f * txm_clampf(species->leaf_size, 0.01f, 4);
+    cloud.scale[0] = cloud.scale[2] = txm_minf(1, 1 / flat);
+    cloud.scale[1] = txm_minf(1, flat);
+    cloud.rng = txm_rng_make(look, 0x1eaf);
+    cloud.phase = 6.2831853f * txm_rng_float(&cloud.rng);
+    cloud.seed = txm_rng_next(&cloud.rng);
+    cloud.droop = species->leaf_shape == TREEPIECES_LEAF_LANCE     ? 0.8f
+                  : species->leaf_shape == TREEPIECES_LEAF_BLOSSOM ? 0
+                                                                   : 0.2f;
     for (int i = 0; i < count; i++) {
-        if (species->leaf_shape == TREEPIECES_LEAF_NEEDLE)
-            tpc_needle_card(i, count, phase, scale, half, &rng, &cards[i]);
-        else tpc_leafy_card(species, cards, i, scale, half, &rng);
+        if (cloud.kind == TREEPIECES_CLOUD_SHOOTS) tpc_shoot_card(&cloud, cards, i);
+        else if (cloud.kind == TREEPIECES_CLOUD_STRIPS) tpc_strip_card(&cloud, cards, i);
+        else tpc_twig_card(&cloud, cards, i);
         tpc_keep_inside(&cards[i]);
     }
     return count;
@@ -4569,7 +4686,7 @@ TREEPIECES_API int treepieces_cloud(const treepieces_species *species, uint32_t 
    covers it, so that edges are antialiased without seams and rows are independent of each other.
    Lengths are in sides of the image, y points down. */
 enum {
-    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* shape of a mark: a tapering stroke */
+    TPC_TWIG = TREEPIECES_LEAF_COMPOUND + 1, /* shape of a mark: a tapering stroke */
     TPC_MARKS = 1024,
     TPC_SAMPLES = 4 /* per pixel, across and down */
 };
@@ -4602,9 +4719,10 @@ typedef struct tpc_habit {
 } tpc_habit;
 
 static const tpc_habit tpc_habits[] = {
-    {9, 6, 6, 0.23f, 0.31f, 0.02f, 58, 0.10f},   {7, 5, 4, 0.31f, 0.34f, 0.01f, 55, 0.06f},
-    {15, 6, 9, 0.32f, 0.085f, 0.02f, 38, 0.14f}, {8, 6, 6, 0.20f, 0.44f, 0.05f, 62, 0.06f},
-    {0, 9, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.105f, 0.42f, 0.06f, 75, 0},
+    {9, 8, 8, 0.15f, 0.32f, 0.015f, 58, 0.10f},   {7, 7, 6, 0.20f, 0.34f, 0.01f, 55, 0.06f},
+    {15, 6, 11, 0.20f, 0.085f, 0.02f, 38, 0.14f}, {8, 8, 8, 0.125f, 0.44f, 0.04f, 62, 0.06f},
+    {0, 11, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.09f, 0.42f, 0.05f, 75, 0},
+    {6, 7, 5, 0.19f, 0.19f, 0.05f, 62, 0.04f},    {5, 5, 3, 0.32f, 0.30f, 0.02f, 55, 0.08f},
 };
 
 /* Half the width of a leaf at u of its length, over its maximum; side: 0..1 how far from the
@@ -4635,7 +4753,7 @@ static float tpc_outline(int shape, float u, float side) {
 
 /* The color of a leaf at u of its length and x across; half: half its width there. */
 static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, float color[3]) {
-    static const float veins[] = {9, 6, 11, 7}; /* by shape */
+    static const float veins[] = {9, 6, 11, 7}; /* by shape, of those before needles */
     const float across = x < 0 ? -x : x, edge = half > 0 ? across / half : 0;
     float shade = (x < 0 ? 1 - m->fold : 1 + m->fold) * (0.86f + 0.1f * u + 0.1f * edge), light = 0;
     if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the bulges between them */
@@ -4773,7 +4891,7 @@ static void tpc_advance(const float a[2], const float heading[2], float degrees,
 
 /* The base color made a little lighter or darker, yellower or bluer, at random. */
 static void tpc_vary_color(tpc_spray *s, const float base[3], float color[3]) {
-    const float light = 1 + 0.13f * tpc_signed(&s->rng), warm = 0.09f * tpc_signed(&s->rng);
+    const float light = 1 + 0.18f * tpc_signed(&s->rng), warm = 0.12f * tpc_signed(&s->rng);
     color[0] = base[0] * light * (1 + warm);
     color[1] = base[1] * light;
     color[2] = base[2] * light * (1 - 1.5f * warm);
@@ -4823,23 +4941,65 @@ static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float h
     }
 }
 
+/* Add one blade of a leaf; NULL as of tpc_add_mark. */
+static tpc_mark *tpc_add_blade(tpc_spray *s, int outline, const float foot[2], const float heading[2],
+                               float degrees, float length, float wide, const float color[3]) {
+    const tpc_habit *habit = &tpc_habits[s->shape];
+    const float half = length * wide, bend = habit->bend * tpc_signed(&s->rng);
+    float tip[2];
+    tpc_advance(foot, heading, degrees, length, 0.015f + 0.75f * half, tip);
+    tpc_mark *blade = tpc_add_mark(s, outline, foot, tip, half, bend, color);
+    if (!blade) return NULL;
+    blade->fold = 0.09f * tpc_signed(&s->rng);
+    for (int k = 0; k < 3; k++) blade->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
+    return blade;
+}
+
+/* A palmate leaf: five lobes from one point, the middle one last, on top. */
+static void tpc_add_lobes(tpc_spray *s, const float foot[2], const float heading[2], float degrees,
+                          float length, const float color[3]) {
+    static const float angles[] = {-88, 88, -42, 42, 0}, lengths[] = {0.55f, 0.55f, 0.85f, 0.85f, 1};
+    for (int i = 0; i < 5; i++)
+        tpc_add_blade(s, TREEPIECES_LEAF_OVAL, foot, heading, degrees + angles[i],
+                      lengths[i] * length, tpc_habits[s->shape].width, color);
+}
+
+/* A compound leaf: pairs of leaflets on a stalk, and one at its end. */
+static void tpc_add_leaflets(tpc_spray *s, const float foot[2], const float heading[2], float degrees,
+                             float length, const float color[3]) {
+    enum { PAIRS = 4 };
+    const float leaflet = 0.36f * length, wide = tpc_habits[s->shape].width;
+    float end[2], at[2];
+    tpc_advance(foot, heading, degrees, length - leaflet, 0.05f, end);
+    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, foot, end, 0.003f, 0, color);
+    if (stalk) stalk->taper = 0.6f;
+    for (int i = 0; i < 2 * PAIRS; i++) {
+        const int pair = i / 2;
+        const float along = 0.25f + 0.7f * (float)pair / (float)(PAIRS - 1);
+        for (int k = 0; k < 2; k++) at[k] = txm_lerpf(foot[k], end[k], along);
+        tpc_add_blade(s, TREEPIECES_LEAF_OVAL, at, heading, degrees + (i % 2 ? -55.0f : 55.0f), leaflet,
+                      wide, color);
+    }
+    tpc_add_blade(s, TREEPIECES_LEAF_OVAL, end, heading, degrees, leaflet, wide, color);
+}
+
 /* Add a leaf with its petiole, seen roughly from above. */
 static void tpc_add_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
                          float degrees, float size, const float base[3]) {
     const tpc_habit *habit = &tpc_habits[shape];
-    float foot[2], tip[2], color[3];
-    const float length = habit->length * size * (0.88f + 0.24f * txm_rng_float(&s->rng));
-    const float half = length * habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
-    const float bend = habit->bend * tpc_signed(&s->rng), margin = 0.015f + 0.75f * half;
+    float foot[2], color[3];
+    const float length = habit->length * size * (0.85f + 0.3f * txm_rng_float(&s->rng));
+    const float wide = habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
     tpc_vary_color(s, base, color);
     tpc_advance(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
-    tpc_advance(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
-    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.004f, 0, color);
+    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.003f, 0, color);
     if (stalk) stalk->taper = 0.7f;
-    tpc_mark *leaf = tpc_add_mark(s, shape, foot, tip, half, bend, color);
-    if (!leaf) return;
-    leaf->fold = 0.09f * tpc_signed(&s->rng);
-    for (int k = 0; k < 3; k++) leaf->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
+    const float lean = 8 * tpc_signed(&s->rng);
+    if (shape == TREEPIECES_LEAF_PALMATE)
+        tpc_add_lobes(s, foot, heading, degrees + lean, length, color);
+    else if (shape == TREEPIECES_LEAF_COMPOUND)
+        tpc_add_leaflets(s, foot, heading, degrees + lean, length, color);
+    else tpc_add_blade(s, shape, foot, heading, degrees + lean, length, wide, color);
 }
 
 /* Add a flower: five petals and the stamens, seen obliquely. */
@@ -4926,7 +5086,22 @@ static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
     }
 }
 
-/* Add all marks of the spray: a stem upwards from the middle of the lower side, twigs on both
+/* A spray for hanging strips: long shoots side by side, of different lengths. */
+static void tpc_make_strips(tpc_spray *s) {
+    enum { SHOOTS = 6, LEAVES = 20 };
+    for (int i = 0; i < SHOOTS; i++) {
+        const float x = ((float)i + 0.5f + 0.3f * tpc_signed(&s->rng)) / (float)SHOOTS;
+        tpc_stem stem = {{0, 1}, {0, 0}, 0};
+        stem.from[0] = 0.5f + 0.86f * (x - 0.5f);
+        stem.to[0] = txm_clampf(stem.from[0] + 0.06f * tpc_signed(&s->rng), 0.08f, 0.92f);
+        stem.to[1] = 0.08f + 0.4f * txm_rng_float(&s->rng) * txm_rng_float(&s->rng);
+        stem.bend = 0.025f * tpc_signed(&s->rng);
+        tpc_add_stem(s, &stem, 0.006f, 0.002f);
+        tpc_add_foliage(s, &stem, LEAVES, 0.02f, 0.85f);
+    }
+}
+
+/* A spray for all other clouds: a stem upwards from the middle of the lower side, twigs on both
    sides. */
 static void tpc_make_spray(tpc_spray *s) {
     const tpc_habit *habit = &tpc_habits[s->shape];
@@ -4936,22 +5111,22 @@ static void tpc_make_spray(tpc_spray *s) {
     stem.to[0] += 0.06f * tpc_signed(&s->rng);
     stem.to[1] = top;
     stem.bend = 0.05f * tpc_signed(&s->rng);
-    tpc_add_stem(s, &stem, 0.011f, 0.004f);
+    tpc_add_stem(s, &stem, 0.010f, 0.003f);
     for (int i = 0; i < habit->twigs; i++) {
-        const float along = 0.05f + 0.7f * (float)i / (float)habit->twigs;
-        const float side = i % 2 ? -1.0f : 1.0f, length = 0.5f * (1.05f - 0.6f * along);
+        const float along = 0.05f + 0.75f * (float)i / (float)habit->twigs;
+        const float side = i % 2 ? -1.0f : 1.0f, length = 0.52f * (1.05f - 0.6f * along);
         const float angle = side * (66 - 24 * along) + 5 * tpc_signed(&s->rng);
         tpc_stem twig;
         float heading[2];
         tpc_stem_at(&stem, along, twig.from, heading);
         tpc_advance(twig.from, heading, angle, length, 0.12f, twig.to);
         twig.bend = -0.08f * side;
-        tpc_add_stem(s, &twig, 0.007f, 0.003f);
+        tpc_add_stem(s, &twig, 0.006f, 0.0025f);
         if (is_needle) tpc_add_needles(s, &twig, 0.08f);
-        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
+        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.25f, 0.85f);
     }
     if (is_needle) tpc_add_needles(s, &stem, 0.03f);
-    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 1);
+    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 0.88f);
 }
 
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
@@ -4971,9 +5146,12 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     status = spray.marks ? tpc_new_picture(&out, &arena, env, &spray.out)
                          : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
     spray.species = species;
-    spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
+    spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_COMPOUND);
     spray.rng = txm_rng_make(seed, 0x59a7);
-    if (status == TXM_OK) tpc_make_spray(&spray);
+    const int is_needle = spray.shape == TREEPIECES_LEAF_NEEDLE;
+    if (status == TXM_OK && species->cloud_kind == TREEPIECES_CLOUD_STRIPS && !is_needle)
+        tpc_make_strips(&spray);
+    else if (status == TXM_OK) tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
         if (txm_progress(env, (float)y / (float)out.height, "leaves"))
@@ -4989,7 +5167,7 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
 
 /* The color of a point p of a card is that of its texel, times
 
-       (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.65 + 0.35 min(1, p.p))
+       (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.75 + 0.25 min(1, p.p))
 
    with the normal n of the card, l towards the light and the forward axis f of the view: wrap
    lighting, light transmitted by leaves when the sun is behind them, and shade in the middle of the
@@ -5045,7 +5223,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
             if (!(z > depths[column])) continue;
             const uint8_t *texel = tpc_texel(leaves, s, t);
             if (texel[3] < 128) continue;
-            const float shade = light * (0.65f + 0.35f * txm_minf(1, x * x + y * y + z * z));
+            const float shade = light * (0.75f + 0.25f * txm_minf(1, x * x + y * y + z * z));
             for (int k = 0; k < 3; k++) {
                 const float lit = txm_clampf((float)texel[k] * shade, 0, 255);
                 colors[4 * column + k] = (uint8_t)(lit + 0.5f);
@@ -5473,20 +5651,64 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */
 
-/* Write card number `index` of the mesh, of a cloud about `center`. */
+/* A cloud where it is in a tree: turned about y by bits of its look, so that those of one kind differ. */
+typedef struct tpc_placed_cloud {
+    float center[3], radius;
+    float sine, cosine;
+    float crown[3]; /* the middle of the crown */
+    uint32_t joint;
+} tpc_placed_cloud;
+
+static void tpc_cluster_center(const treepieces_cluster *c, const float *bones, float center[3]) {
+    const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
+    for (int k = 0; k < 3; k++) center[k] = bone[4 * k + 3] + c->along * bone[4 * k + 1];
+}
+
+static void tpc_place_cloud(const treepieces_cluster *c, const float *bones, uint32_t first_node,
+                            const float crown[3], tpc_placed_cloud *cloud) {
+    double sine, cosine;
+    txm_sincos((double)(c->look >> 8 & 255u) * (TXM_PI / 128), &sine, &cosine);
+    tpc_cluster_center(c, bones, cloud->center);
+    cloud->radius = c->radius;
+    cloud->sine = txm_float(sine);
+    cloud->cosine = txm_float(cosine);
+    memcpy(cloud->crown, crown, sizeof cloud->crown);
+    cloud->joint = c->node - first_node;
+}
+
+static void tpc_turn_cloud(const tpc_placed_cloud *cloud, const float v[3], float out[3]) {
+    out[0] = cloud->cosine * v[0] + cloud->sine * v[2];
+    out[1] = v[1];
+    out[2] = cloud->cosine * v[2] - cloud->sine * v[0];
+}
+
+/* Write card number `index` of the mesh. Its normal is bent outwards, so that light runs round the
+   crown and not round each cloud. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
-                          const float center[3], float radius, uint32_t joint) {
+                          const tpc_placed_cloud *cloud) {
     static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
     static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
+    float center[3], right[3], up[3], own[3], normal[3];
+    tpc_turn_cloud(cloud, card->center, center);
+    tpc_turn_cloud(cloud, card->right, right);
+    tpc_turn_cloud(cloud, card->up, up);
+    tpc_turn_cloud(cloud, card->normal, own);
+    for (int a = 0; a < 3; a++) {
+        center[a] = cloud->center[a] + cloud->radius * center[a];
+        normal[a] = center[a] - cloud->crown[a];
+    }
+    tpc_unit_or(normal, own[0], own[1], own[2]);
+    for (int a = 0; a < 3; a++) normal[a] = 0.8f * normal[a] + 0.6f * own[a];
+    tpc_unit_or(normal, own[0], own[1], own[2]);
     for (size_t k = 0; k < 4; k++) {
         const size_t vertex = 4 * index + k;
         for (size_t a = 0; a < 3; a++) {
-            const float across = sides[k][0] * card->right[a] + sides[k][1] * card->up[a];
-            m->positions[3 * vertex + a] = center[a] + radius * (card->center[a] + across);
-            m->normals[3 * vertex + a] = card->normal[a];
+            const float across = sides[k][0] * right[a] + sides[k][1] * up[a];
+            m->positions[3 * vertex + a] = center[a] + cloud->radius * across;
+            m->normals[3 * vertex + a] = normal[a];
         }
         for (size_t j = 0; j < 4; j++) {
-            m->joints[4 * vertex + j] = j ? 0 : joint;
+            m->joints[4 * vertex + j] = j ? 0 : cloud->joint;
             m->weights[4 * vertex + j] = j ? 0 : 1;
         }
     }
@@ -5495,6 +5717,19 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
         m->uvs[12 * index + 2 * k] = sides[corners[k]][0] > 0 ? 1.0f : 0.0f;
         m->uvs[12 * index + 2 * k + 1] = sides[corners[k]][1] > 0 ? 0.0f : 1.0f;
     }
+}
+
+/* The mean of the centres of the leaf clouds. */
+static void tpc_crown_middle(const treepieces_forest *forest, const treepieces_tree *t,
+                             const float *bones, float middle[3]) {
+    double sum[3] = {0, 0, 0};
+    float center[3];
+    for (uint32_t i = 0; i < t->cluster_count; i++) {
+        tpc_cluster_center(&forest->clusters[t->first_cluster + i], bones, center);
+        for (int k = 0; k < 3; k++) sum[k] += (double)center[k];
+    }
+    for (int k = 0; k < 3; k++)
+        middle[k] = t->cluster_count ? txm_float(sum[k] / (double)t->cluster_count) : 0;
 }
 
 TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
@@ -5525,15 +5760,14 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
     }
     for (int k = 0; k < looks && status == TXM_OK; k++)
         treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
+    float crown[3];
+    tpc_crown_middle(forest, t, bones, crown);
     for (uint32_t i = 0; i < t->cluster_count && status == TXM_OK; i++) {
         const treepieces_cluster *c = &forest->clusters[t->first_cluster + i];
-        const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
         const treepieces_card *look = cards + (size_t)(c->look % (uint32_t)looks) * count;
-        const float center[3] = {bone[3] + c->along * bone[1], bone[7] + c->along * bone[5],
-                                 bone[11] + c->along * bone[9]};
-        for (size_t k = 0; k < count; k++)
-            tpc_bake_card(&made->mesh, count * i + k, &look[k], center, c->radius,
-                          c->node - t->first_node);
+        tpc_placed_cloud cloud;
+        tpc_place_cloud(c, bones, t->first_node, crown, &cloud);
+        for (size_t k = 0; k < count; k++) tpc_bake_card(&made->mesh, count * i + k, &look[k], &cloud);
     }
     txm_arena_free(&scratch);
     *out = tpc_finish_mesh(made, status);

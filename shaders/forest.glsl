@@ -295,7 +295,7 @@ layout(location = 1) out float depth;
 void main() {
     vec4 texel = texelFetch(leaves, ivec3(leaf * vec2(textureSize(leaves, 0).xy), species), 0);
     if (texel.a < 0.5) discard;
-    color = vec4(min(texel.rgb * lit * (0.65 + 0.35 * min(1.0, dot(at, at))), 1.0), 1.0);
+    color = vec4(min(texel.rgb * lit * (0.75 + 0.25 * min(1.0, dot(at, at))), 1.0), 1.0);
     depth = at.z;
 }
 #endif

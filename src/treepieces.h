@@ -293,8 +293,26 @@ typedef enum treepieces_leaf_shape {
     TREEPIECES_LEAF_LANCE,  /* willow    */
     TREEPIECES_LEAF_HEART,  /* poplar    */
     TREEPIECES_LEAF_NEEDLE, /* conifers  */
-    TREEPIECES_LEAF_BLOSSOM /* almond    */
+    TREEPIECES_LEAF_BLOSSOM, /* almond   */
+    TREEPIECES_LEAF_PALMATE, /* maple    */
+    TREEPIECES_LEAF_COMPOUND /* ash: leaflets on both sides of a stalk */
 } treepieces_leaf_shape;
+
+/* How the cards of a leaf cloud lie. */
+typedef enum treepieces_cloud_kind {
+    TREEPIECES_CLOUD_ROUND = 0, /* twigs that grow outwards in all directions, fewer inside      */
+    TREEPIECES_CLOUD_LAYERS,    /* flat sprays one above the other                               */
+    TREEPIECES_CLOUD_SHOOTS,    /* along shoots that radiate from the centre                     */
+    TREEPIECES_CLOUD_STRIPS     /* hanging strips                                                */
+} treepieces_cloud_kind;
+
+/* The drawn bark. */
+typedef enum treepieces_bark_kind {
+    TREEPIECES_BARK_FURROWED = 0, /* ridges between fissures along the stem: oak, willow          */
+    TREEPIECES_BARK_SMOOTH,       /* fine wrinkles: beech                                         */
+    TREEPIECES_BARK_LENTICELS,    /* smooth, with marks across: birch (dark), almond (pale)       */
+    TREEPIECES_BARK_PLATES        /* plates that flake off: pine                                  */
+} treepieces_bark_kind;
 
 /* A kind of tree. For the text form see treepieces_species_parse. */
 typedef struct treepieces_species {
@@ -313,8 +331,10 @@ typedef struct treepieces_species {
     int leaf_shape;   /* treepieces_leaf_shape                                                    */
     int leaf_count;   /* cards per leaf cloud, 1..256; 0 = no leaves                              */
     float leaf_size;  /* side of a card, in radii of the cloud                                    */
+    int cloud_kind;   /* treepieces_cloud_kind                                                    */
     float cloud;      /* radius of a leaf cloud, metres                                           */
     float cloud_flat; /* height of a cloud over its width, 0.1..2                                 */
+    int bark_kind;    /* treepieces_bark_kind                                                     */
     float leaf_color[3], bark_color[3]; /* sRGB 0..1: tint of the drawn leaves and bark           */
 } treepieces_species;
 
@@ -689,7 +709,8 @@ TREEPIECES_API txm_status treepieces_impostor(const treepieces_impostor_desc *de
 
 /* The leaf cards of a tree as a mesh, for renderers without impostors: two triangles per card,
    bound to the bone of its cluster. joints and weights as in treepieces_bake. looks: how many
-   different clouds are used, 1..64; a cluster takes cloud number look mod looks. */
+   different clouds are used, 1..64; a cluster takes cloud number look mod looks, turned about y by
+   2 pi (look >> 8 & 255) / 256. Normals point out of the crown, more or less. */
 TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
                                                  const float *bones, int looks, txm_env *env,
                                                  treepieces_mesh **out);

@@ -371,20 +371,64 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
 
 /* ---- foliage: baked leaf cards ------------------------------------------------------------- */
 
-/* Write card number `index` of the mesh, of a cloud about `center`. */
+/* A cloud where it is in a tree: turned about y by bits of its look, so that those of one kind differ. */
+typedef struct tpc_placed_cloud {
+    float center[3], radius;
+    float sine, cosine;
+    float crown[3]; /* the middle of the crown */
+    uint32_t joint;
+} tpc_placed_cloud;
+
+static void tpc_cluster_center(const treepieces_cluster *c, const float *bones, float center[3]) {
+    const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
+    for (int k = 0; k < 3; k++) center[k] = bone[4 * k + 3] + c->along * bone[4 * k + 1];
+}
+
+static void tpc_place_cloud(const treepieces_cluster *c, const float *bones, uint32_t first_node,
+                            const float crown[3], tpc_placed_cloud *cloud) {
+    double sine, cosine;
+    txm_sincos((double)(c->look >> 8 & 255u) * (TXM_PI / 128), &sine, &cosine);
+    tpc_cluster_center(c, bones, cloud->center);
+    cloud->radius = c->radius;
+    cloud->sine = txm_float(sine);
+    cloud->cosine = txm_float(cosine);
+    memcpy(cloud->crown, crown, sizeof cloud->crown);
+    cloud->joint = c->node - first_node;
+}
+
+static void tpc_turn_cloud(const tpc_placed_cloud *cloud, const float v[3], float out[3]) {
+    out[0] = cloud->cosine * v[0] + cloud->sine * v[2];
+    out[1] = v[1];
+    out[2] = cloud->cosine * v[2] - cloud->sine * v[0];
+}
+
+/* Write card number `index` of the mesh. Its normal is bent outwards, so that light runs round the
+   crown and not round each cloud. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
-                          const float center[3], float radius, uint32_t joint) {
+                          const tpc_placed_cloud *cloud) {
     static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
     static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
+    float center[3], right[3], up[3], own[3], normal[3];
+    tpc_turn_cloud(cloud, card->center, center);
+    tpc_turn_cloud(cloud, card->right, right);
+    tpc_turn_cloud(cloud, card->up, up);
+    tpc_turn_cloud(cloud, card->normal, own);
+    for (int a = 0; a < 3; a++) {
+        center[a] = cloud->center[a] + cloud->radius * center[a];
+        normal[a] = center[a] - cloud->crown[a];
+    }
+    tpc_unit_or(normal, own[0], own[1], own[2]);
+    for (int a = 0; a < 3; a++) normal[a] = 0.8f * normal[a] + 0.6f * own[a];
+    tpc_unit_or(normal, own[0], own[1], own[2]);
     for (size_t k = 0; k < 4; k++) {
         const size_t vertex = 4 * index + k;
         for (size_t a = 0; a < 3; a++) {
-            const float across = sides[k][0] * card->right[a] + sides[k][1] * card->up[a];
-            m->positions[3 * vertex + a] = center[a] + radius * (card->center[a] + across);
-            m->normals[3 * vertex + a] = card->normal[a];
+            const float across = sides[k][0] * right[a] + sides[k][1] * up[a];
+            m->positions[3 * vertex + a] = center[a] + cloud->radius * across;
+            m->normals[3 * vertex + a] = normal[a];
         }
         for (size_t j = 0; j < 4; j++) {
-            m->joints[4 * vertex + j] = j ? 0 : joint;
+            m->joints[4 * vertex + j] = j ? 0 : cloud->joint;
             m->weights[4 * vertex + j] = j ? 0 : 1;
         }
     }
@@ -393,6 +437,19 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
         m->uvs[12 * index + 2 * k] = sides[corners[k]][0] > 0 ? 1.0f : 0.0f;
         m->uvs[12 * index + 2 * k + 1] = sides[corners[k]][1] > 0 ? 0.0f : 1.0f;
     }
+}
+
+/* The mean of the centres of the leaf clouds. */
+static void tpc_crown_middle(const treepieces_forest *forest, const treepieces_tree *t,
+                             const float *bones, float middle[3]) {
+    double sum[3] = {0, 0, 0};
+    float center[3];
+    for (uint32_t i = 0; i < t->cluster_count; i++) {
+        tpc_cluster_center(&forest->clusters[t->first_cluster + i], bones, center);
+        for (int k = 0; k < 3; k++) sum[k] += (double)center[k];
+    }
+    for (int k = 0; k < 3; k++)
+        middle[k] = t->cluster_count ? txm_float(sum[k] / (double)t->cluster_count) : 0;
 }
 
 TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
@@ -423,15 +480,14 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
     }
     for (int k = 0; k < looks && status == TXM_OK; k++)
         treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
+    float crown[3];
+    tpc_crown_middle(forest, t, bones, crown);
     for (uint32_t i = 0; i < t->cluster_count && status == TXM_OK; i++) {
         const treepieces_cluster *c = &forest->clusters[t->first_cluster + i];
-        const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
         const treepieces_card *look = cards + (size_t)(c->look % (uint32_t)looks) * count;
-        const float center[3] = {bone[3] + c->along * bone[1], bone[7] + c->along * bone[5],
-                                 bone[11] + c->along * bone[9]};
-        for (size_t k = 0; k < count; k++)
-            tpc_bake_card(&made->mesh, count * i + k, &look[k], center, c->radius,
-                          c->node - t->first_node);
+        tpc_placed_cloud cloud;
+        tpc_place_cloud(c, bones, t->first_node, crown, &cloud);
+        for (size_t k = 0; k < count; k++) tpc_bake_card(&made->mesh, count * i + k, &look[k], &cloud);
     }
     txm_arena_free(&scratch);
     *out = tpc_finish_mesh(made, status);

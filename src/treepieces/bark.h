@@ -256,41 +256,71 @@ static float tpc_framed_noise(float x, float y, int columns, int rows, uint64_t 
     return 0.5f + (outside * frame + inside * own) / sqrtf(inside * inside + outside * outside);
 }
 
-/* Brightness of bark, about 1: plates between fissures along the stem. The fissures cross the frame
-   at the same places in all tiles and wander in between, so that the frame is not visible. */
-static float tpc_bark_relief(float x, float y, uint64_t seed, int number) {
-    enum { PLATES = 3, CRACKS = 2 }; /* across and along a tile */
-    const float slow = tpc_framed_noise(x, y, 4, 3, seed + 1000, number) - 0.5f;
-    const float quick = tpc_framed_noise(x, y, 9, 7, seed + 2000, number) - 0.5f;
-    const float grain = tpc_framed_noise(x, y, 32, 11, seed + 3000, number) - 0.5f;
-    const float across = (float)PLATES * (1 + x) + 0.9f * slow + 0.25f * quick + 0.25f * grain;
-    const int plate = (int)across;
-    const float f = across - (float)plate, edge = txm_minf(f, 1 - f);
-    const float gap = 0.1f + 0.3f * tpc_framed_noise(x, y, 6, 3, seed + 4000, number);
-    /* cracks across a plate, at heights that differ from plate to plate */
-    const uint64_t own = txm_hash(seed + 9000 + (uint64_t)(plate % PLATES));
-    const float bend = tpc_framed_noise(x, y, 3, 4, seed + 5000, number) - 0.5f;
-    const float along = (float)CRACKS * (1 + y) + (float)(own >> 60) / 16 + 0.9f * bend;
-    const float g = along - (float)(int)along;
-    const float open = 2.4f * (tpc_framed_noise(x, y, 5, 4, seed + 6000, number) - 0.42f);
-    const float crack = tpc_fade(txm_minf(g, 1 - g) / 0.09f) * txm_clampf(open, 0, 1);
-    const float depth = txm_maxf(tpc_fade(edge / gap), 0.75f * crack);
-    /* a plate is lit from one side */
-    const float top = 0.58f + 0.16f * (0.5f - f) + 0.15f * slow + 0.25f * quick;
-    return 0.46f + top * (1 - depth) + (0.4f - 0.2f * depth) * grain;
+/* A place of a tile of bark that is being drawn. */
+typedef struct tpc_bark_place {
+    float x, y; /* in the tile, 0..1 */
+    uint64_t seed;
+    int number; /* of the tile */
+} tpc_bark_place;
+
+/* -1/2..1/2; salt: which of the noises of a bark */
+static float tpc_bark_noise(const tpc_bark_place *p, int columns, int rows, uint64_t salt) {
+    return tpc_framed_noise(p->x, p->y, columns, rows, p->seed + salt, p->number) - 0.5f;
 }
 
-/* Smooth pale bark with dark lenticels across it, as of birches; none lie on the frame, where their
-   repetition would be visible. */
-static float tpc_birch_relief(float x, float y, uint64_t seed, int number) {
-    const float border = txm_minf(txm_minf(x, 1 - x), txm_minf(y, 1 - y));
+/* Brightness of bark, about 1: ridges between fissures along the stem, grain on them. A fissure crosses
+   the frame in the middle of a tile, at the same place in all, and wanders and ends in between, so that
+   the frame is not visible. Plates: wider ones, with cracks all round, of different height. */
+static float tpc_furrowed_bark(const tpc_bark_place *p, int is_plates) {
+    const float slow = tpc_bark_noise(p, 3, 2, 1000), quick = tpc_bark_noise(p, 9, 6, 2000);
+    const float grain = tpc_bark_noise(p, 26, 8, 3000), fine = tpc_bark_noise(p, 40, 24, 3500);
+    const float across = 1.5f + p->x + 0.75f * slow + 0.16f * quick + 0.07f * grain;
+    const int ridge = (int)across;
+    const float f = across - (float)ridge, edge = txm_minf(f, 1 - f);
+    const float border = txm_minf(txm_minf(p->x, 1 - p->x), txm_minf(p->y, 1 - p->y));
+    const float inside = 1 - tpc_fade((border - 0.03f) * 4);
+    const float gap = (is_plates ? 0.09f : 0.13f) + 0.42f * inside * tpc_bark_noise(p, 4, 3, 4000);
+    /* cracks across a ridge, half a tile higher on every second one */
+    const float bend = tpc_bark_noise(p, 3, 3, 5000);
+    const float along = 1 + p->y + 0.5f * (float)(ridge & 1) + 0.7f * bend + 0.1f * quick;
+    const float g = along - (float)(int)along;
+    const float open = is_plates ? 1 : 2.4f * (tpc_bark_noise(p, 3, 3, 6000) + 0.02f);
+    const float crack = inside * tpc_fade(txm_minf(g, 1 - g) / 0.07f) * txm_clampf(open, 0, 1);
+    const float fissure = gap > 0.02f ? tpc_fade(edge / gap) : 0;
+    const float depth = txm_maxf(fissure, (is_plates ? 0.9f : 0.6f) * crack);
+    /* a ridge is lit from one side; layers that flake off have edges */
+    const float flake = is_plates ? 0.22f * tpc_fade(fabsf(slow + 0.4f * quick) * 12) : 0;
+    const float top = 0.60f + 0.22f * (0.5f - f) + 0.22f * slow + 0.2f * quick - flake;
+    return 0.45f + top * (1 - 0.85f * depth) + (0.34f - 0.2f * depth) * grain + 0.16f * fine;
+}
+
+/* Smooth bark: spots, and fine wrinkles across the stem. */
+static float tpc_smooth_bark(const tpc_bark_place *p) {
+    const float spots = tpc_bark_noise(p, 3, 4, 6000), wrinkle = tpc_bark_noise(p, 4, 22, 6500);
+    const float fine = tpc_bark_noise(p, 24, 40, 7000);
+    return 0.95f + 0.2f * spots + 0.2f * wrinkle + 0.1f * fine;
+}
+
+/* Smooth bark with lenticels across it: dark ones on pale bark, as of birches, else paler ones. None
+   lie on the frame, where their repetition would be visible. */
+static float tpc_lenticel_bark(const tpc_bark_place *p, int is_pale) {
+    const float border = txm_minf(txm_minf(p->x, 1 - p->x), txm_minf(p->y, 1 - p->y));
     const float inside = 1 - tpc_fade((border - 0.03f) * 5);
-    const uint64_t own = seed + 5000 + (uint64_t)number;
-    const float mark = tpc_noise(x, y, 3, 17, own), wide = tpc_noise(x, y, 2, 5, own + 1000);
-    const float shade = tpc_framed_noise(x, y, 3, 6, seed + 6000, number) - 0.5f;
-    const float grain = tpc_framed_noise(x, y, 20, 40, seed + 7000, number) - 0.5f;
-    const float dark = 0.55f * tpc_fade((0.9f - mark) * 9) + 0.4f * tpc_fade((0.97f - wide) * 9);
-    return 1 - inside * dark + 0.1f * grain + 0.1f * shade;
+    const uint64_t own = p->seed + 5000 + (uint64_t)p->number;
+    const float mark = tpc_noise(p->x, p->y, 2, 13, own);
+    const float wide = tpc_noise(p->x, p->y, 1, 6, own + 1000);
+    const float shade = tpc_bark_noise(p, 3, 5, 6000), grain = tpc_bark_noise(p, 20, 40, 7000);
+    const float marks = inside * (0.55f * tpc_fade((0.88f - mark) * 8) + 0.5f * tpc_fade((0.93f - wide) * 8));
+    return (is_pale ? 0.98f - marks : 0.92f + 0.6f * marks) + 0.1f * grain + 0.12f * shade;
+}
+
+static float tpc_bark_relief(const treepieces_species *species, const tpc_bark_place *p) {
+    const float *color = species->bark_color;
+    switch (species->bark_kind) {
+    case TREEPIECES_BARK_SMOOTH: return tpc_smooth_bark(p);
+    case TREEPIECES_BARK_LENTICELS: return tpc_lenticel_bark(p, color[0] + color[1] + color[2] > 1.5f);
+    default: return tpc_furrowed_bark(p, species->bark_kind == TREEPIECES_BARK_PLATES);
+    }
 }
 
 TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species, uint64_t seed,
@@ -305,16 +335,14 @@ TREEPIECES_API txm_status treepieces_draw_bark(const treepieces_species *species
             return txm_fail(env, TXM_BAD_ARGUMENT, "tiles must be square, of 3 or 4 channels");
     }
     const float *color = species->bark_color;
-    const int is_pale = color[0] + color[1] + color[2] > 2;
     for (int i = 0; i < tile_count; i++) {
         const txm_image t = txm_image_resolve(tiles[i]);
         for (int y = 0; y < t.height; y++) {
             for (int x = 0; x < t.width; x++) {
-                const float u = ((float)x + 0.5f) / (float)t.width;
-                const float v = ((float)y + 0.5f) / (float)t.height;
-                const float relief =
-                    is_pale ? tpc_birch_relief(u, v, seed, i) : tpc_bark_relief(u, v, seed, i);
-                const float moss = tpc_framed_noise(u, v, 4, 4, seed + 8000, i) - 0.5f;
+                const tpc_bark_place p = {((float)x + 0.5f) / (float)t.width,
+                                          ((float)y + 0.5f) / (float)t.height, seed, i};
+                const float relief = tpc_bark_relief(species, &p);
+                const float moss = tpc_bark_noise(&p, 4, 4, 8000);
                 const float tint[4] = {1 - 0.08f * moss, 1 + 0.05f * moss, 1 - 0.1f * moss, 1};
                 for (int c = 0; c < t.channels; c++)
                     txm_image_set(&t, x, y, c,

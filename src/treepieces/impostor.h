@@ -8,7 +8,7 @@
 
 /* The color of a point p of a card is that of its texel, times
 
-       (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.65 + 0.35 min(1, p.p))
+       (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.75 + 0.25 min(1, p.p))
 
    with the normal n of the card, l towards the light and the forward axis f of the view: wrap
    lighting, light transmitted by leaves when the sun is behind them, and shade in the middle of the
@@ -64,7 +64,7 @@ static void tpc_draw_card(const treepieces_impostor_desc *d, const treepieces_ca
             if (!(z > depths[column])) continue;
             const uint8_t *texel = tpc_texel(leaves, s, t);
             if (texel[3] < 128) continue;
-            const float shade = light * (0.65f + 0.35f * txm_minf(1, x * x + y * y + z * z));
+            const float shade = light * (0.75f + 0.25f * txm_minf(1, x * x + y * y + z * z));
             for (int k = 0; k < 3; k++) {
                 const float lit = txm_clampf((float)texel[k] * shade, 0, 255);
                 colors[4 * column + k] = (uint8_t)(lit + 0.5f);

@@ -11,7 +11,9 @@ static const char tpc_fresh[] =
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
     "clearance 1.2\n"
     "stiffness 1\n"
-    "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud 0.5\n" "cloud_flat 0.8\n"
+    "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud_kind round\n" "cloud 0.5\n"
+    "cloud_flat 0.8\n"
+    "bark_kind furrowed\n"
     "leaf_color 0.3 0.45 0.15\n" "bark_color 0.4 0.35 0.3\n"
     "order 0\n" "length 8\n" "length_spread 0.1\n" "radius 0.025\n" "taper 0.25\n" "segments 12\n"
     "start 0.25\n" "side 0.45\n" "pair 0.1\n" "fork 0.12\n" "triple 0\n" "fork_angle 25\n"
@@ -34,15 +36,15 @@ static const char tpc_fresh[] =
 
 static const char tpc_oak[] =
     "name oak\n" "flare 1.7\n" "stiffness 1.4\n"
-    "envelope ellipsoid\n" "crown_base 0.08\n" "crown_top 1.12\n" "crown_width 1.35\n"
-    "leaf_shape lobed\n" "leaf_count 40\n" "leaf_size 0.4\n" "cloud 0.85\n" "cloud_flat 0.8\n"
+    "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 1.45\n"
+    "leaf_shape lobed\n" "leaf_count 28\n" "leaf_size 0.42\n" "cloud 1.2\n" "cloud_flat 0.8\n"
     "leaf_color 0.29 0.4 0.13\n" "bark_color 0.4 0.35 0.29\n"
     "order 0\n" "length 15\n" "radius 0.034\n" "taper 0.05\n" "segments 15\n"
     "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.35\n" "fork_angle 30\n" "fork_ratio 0.95\n"
     "wander 9\n" "tropism 0.03\n" "leaves 0.9\n" "leaves_start 0.85\n"
-    "order 1\n" "length 0.6\n" "length_spread 0.2\n" "radius 0.55\n" "taper 0.06\n" "segments 11\n"
+    "order 1\n" "length 0.72\n" "length_spread 0.2\n" "radius 0.55\n" "taper 0.06\n" "segments 12\n"
     "start 0.15\n" "side 0.5\n" "pair 0.05\n" "fork 0.22\n" "fork_angle 28\n"
-    "angle_base 78\n" "angle_top 45\n" "angle_spread 10\n" "profile 1.1 1 0.6\n" "roll 137.5\n"
+    "angle_base 80\n" "angle_top 40\n" "angle_spread 10\n" "profile 1 1 0.75\n" "roll 137.5\n"
     "wander 15\n" "tropism 0.06\n" "leaves 0.7\n" "leaves_start 0.5\n"
     "order 2\n" "gravimorphism 0.5\n"
     "length 0.45\n" "radius 0.5\n" "taper 0.1\n" "segments 7\n"
@@ -58,12 +60,14 @@ static const char tpc_oak[] =
 
 static const char tpc_beech[] =
     "name beech\n" "flare 1.8\n" "stiffness 1.2\n"
-    "leaf_shape oval\n" "leaf_count 44\n" "leaf_size 0.36\n" "cloud 1\n" "cloud_flat 0.6\n"
-    "leaf_color 0.28 0.39 0.14\n" "bark_color 0.52 0.51 0.47\n"
+    "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 0.95\n"
+    "leaf_shape oval\n" "leaf_count 30\n" "leaf_size 0.45\n" "cloud_kind layers\n" "cloud 1.25\n"
+    "cloud_flat 0.5\n"
+    "leaf_color 0.28 0.39 0.14\n" "bark_kind smooth\n" "bark_color 0.47 0.48 0.46\n"
     "order 0\n" "length 20\n" "radius 0.024\n" "taper 0.04\n" "segments 26\n"
     "start 0.14\n" "side 0.8\n" "pair 0.05\n" "fork 0.08\n" "fork_angle 20\n" "fork_ratio 0.95\n"
     "wander 4\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
-    "order 1\n" "length 0.55\n" "radius 0.42\n" "taper 0.05\n" "segments 13\n"
+    "order 1\n" "length 0.6\n" "radius 0.42\n" "taper 0.05\n" "segments 13\n"
     "start 0.12\n" "side 0.7\n" "pair 0.05\n" "fork 0.1\n" "fork_angle 22\n"
     "angle_base 66\n" "angle_top 28\n" "angle_spread 8\n" "profile 1 1 0.4\n"
     "wander 8\n" "tropism 0.05\n" "leaves 0.8\n" "leaves_start 0.5\n"
@@ -77,7 +81,8 @@ static const char tpc_beech[] =
 
 static const char tpc_maple[] =
     "name maple\n" "flare 1.5\n"
-    "leaf_shape lobed\n" "leaf_count 44\n" "leaf_size 0.42\n" "cloud 0.8\n" "cloud_flat 0.8\n"
+    "envelope ellipsoid\n" "crown_base 0.12\n" "crown_top 1.1\n" "crown_width 0.85\n"
+    "leaf_shape palmate\n" "leaf_count 28\n" "leaf_size 0.42\n" "cloud 1.1\n" "cloud_flat 0.85\n"
     "leaf_color 0.74 0.4 0.12\n" "bark_color 0.42 0.38 0.33\n"
     "order 0\n" "length 15\n" "radius 0.02\n" "taper 0.05\n" "segments 20\n"
     "start 0.16\n" "side 0.1\n" "pair 0.5\n" "fork 0.14\n" "fork_angle 20\n" "fork_ratio 0.95\n"
@@ -96,10 +101,11 @@ static const char tpc_maple[] =
 
 static const char tpc_birch[] =
     "name birch\n" "flare 1.3\n" "stiffness 0.7\n"
-    "leaf_shape heart\n" "leaf_count 30\n" "leaf_size 0.34\n" "cloud 0.55\n" "cloud_flat 1.1\n"
-    "leaf_color 0.4 0.52 0.16\n" "bark_color 0.85 0.83 0.79\n"
+    "envelope ellipsoid\n" "crown_base 0.1\n" "crown_top 1.12\n" "crown_width 0.5\n"
+    "leaf_shape heart\n" "leaf_count 15\n" "leaf_size 0.5\n" "cloud 0.75\n" "cloud_flat 1.3\n"
+    "leaf_color 0.4 0.52 0.16\n" "bark_kind lenticels\n" "bark_color 0.85 0.83 0.79\n"
     "order 0\n" "length 18\n" "radius 0.01\n" "taper 0.03\n" "segments 38\n"
-    "start 0.14\n" "side 0.85\n" "pair 0.05\n" "fork 0.01\n" "fork_angle 14\n"
+    "start 0.14\n" "side 0.9\n" "pair 0.05\n" "fork 0\n"
     "wander 3\n" "tropism 0.12\n" "leaves 0.9\n" "leaves_start 0.9\n"
     "order 1\n" "length 0.34\n" "radius 0.36\n" "taper 0.06\n" "segments 11\n"
     "start 0.1\n" "side 0.9\n" "fork 0.02\n"
@@ -114,7 +120,7 @@ static const char tpc_birch[] =
 
 static const char tpc_poplar[] =
     "name poplar\n" "flare 1.5\n" "stiffness 0.9\n"
-    "leaf_shape heart\n" "leaf_count 36\n" "leaf_size 0.36\n" "cloud 0.6\n" "cloud_flat 1.3\n"
+    "leaf_shape heart\n" "leaf_count 26\n" "leaf_size 0.45\n" "cloud 0.85\n" "cloud_flat 1.4\n"
     "leaf_color 0.3 0.44 0.14\n" "bark_color 0.45 0.42 0.36\n"
     "order 0\n" "length 24\n" "radius 0.013\n" "taper 0.03\n" "segments 50\n"
     "start 0.04\n" "side 0.6\n" "pair 0.4\n" "fork 0\n"
@@ -131,11 +137,12 @@ static const char tpc_poplar[] =
 
 static const char tpc_willow[] =
     "name willow\n" "flare 1.6\n" "stiffness 0.6\n"
-    "leaf_shape lance\n" "leaf_count 36\n" "leaf_size 0.42\n" "cloud 0.9\n" "cloud_flat 2\n"
+    "leaf_shape lance\n" "leaf_count 16\n" "leaf_size 0.9\n" "cloud_kind strips\n" "cloud 1.1\n"
+    "cloud_flat 2\n"
     "leaf_color 0.42 0.5 0.18\n" "bark_color 0.42 0.37 0.29\n"
     "order 0\n" "length 10\n" "radius 0.042\n" "taper 0.08\n" "segments 13\n"
-    "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.4\n" "fork_angle 30\n" "fork_ratio 0.95\n"
-    "wander 8\n" "tropism 0.03\n"
+    "start 0.2\n" "side 0.5\n" "pair 0.05\n" "fork 0.4\n" "fork_angle 32\n" "fork_ratio 0.85\n"
+    "wander 8\n" "tropism 0.03\n" "leaves 0.5\n" "leaves_start 0.7\n"
     "order 1\n" "length 0.62\n" "radius 0.5\n" "taper 0.1\n" "segments 10\n"
     "start 0.15\n" "side 0.65\n" "pair 0.3\n" "fork 0.06\n"
     "angle_base 60\n" "angle_top 40\n" "profile 1 1 0.7\n"
@@ -150,8 +157,8 @@ static const char tpc_willow[] =
 
 static const char tpc_almond[] =
     "name almond\n" "flare 1.4\n"
-    "leaf_shape blossom\n" "leaf_count 34\n" "leaf_size 0.3\n" "cloud 0.38\n" "cloud_flat 0.9\n"
-    "leaf_color 0.94 0.76 0.8\n" "bark_color 0.3 0.25 0.22\n"
+    "leaf_shape blossom\n" "leaf_count 30\n" "leaf_size 0.4\n" "cloud 0.5\n" "cloud_flat 0.9\n"
+    "leaf_color 0.94 0.76 0.8\n" "bark_kind lenticels\n" "bark_color 0.3 0.25 0.22\n"
     "order 0\n" "length 5.5\n" "radius 0.026\n" "taper 0.06\n" "segments 14\n"
     "start 0.2\n" "side 0.35\n" "fork 0.42\n" "triple 0.1\n" "fork_angle 32\n" "fork_ratio 0.95\n"
     "wander 8\n" "tropism 0.1\n" "leaves 0.7\n" "leaves_start 0.6\n"
@@ -167,8 +174,9 @@ static const char tpc_almond[] =
 
 static const char tpc_pine[] =
     "name pine\n" "flare 1.4\n"
-    "leaf_shape needle\n" "leaf_count 40\n" "leaf_size 0.5\n" "cloud 0.8\n" "cloud_flat 0.4\n"
-    "leaf_color 0.24 0.35 0.19\n" "bark_color 0.55 0.36 0.24\n"
+    "leaf_shape needle\n" "leaf_count 30\n" "leaf_size 0.42\n" "cloud_kind shoots\n" "cloud 1\n"
+    "cloud_flat 0.5\n"
+    "leaf_color 0.24 0.35 0.19\n" "bark_kind plates\n" "bark_color 0.55 0.36 0.24\n"
     "order 0\n" "length 19\n" "radius 0.0155\n" "taper 0.06\n" "segments 30\n"
     "start 0.42\n" "side 0.3\n" "pair 0.6\n" "fork 0.05\n" "fork_angle 22\n"
     "wander 4\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
@@ -186,8 +194,9 @@ static const char tpc_pine[] =
 
 static const char tpc_spruce[] =
     "name spruce\n" "flare 1.4\n"
-    "leaf_shape needle\n" "leaf_count 16\n" "leaf_size 0.8\n" "cloud 0.46\n" "cloud_flat 0.55\n"
-    "leaf_color 0.2 0.31 0.19\n" "bark_color 0.38 0.3 0.25\n"
+    "leaf_shape needle\n" "leaf_count 16\n" "leaf_size 0.75\n" "cloud_kind layers\n" "cloud 0.6\n"
+    "cloud_flat 0.5\n"
+    "leaf_color 0.2 0.31 0.19\n" "bark_kind plates\n" "bark_color 0.38 0.3 0.25\n"
     "order 0\n" "length 22\n" "radius 0.014\n" "taper 0.03\n" "segments 64\n"
     "start 0.04\n" "side 0.05\n" "pair 0.95\n" "fork 0\n"
     "wander 1\n" "tropism 0.3\n" "leaves 1\n" "leaves_start 0.96\n"

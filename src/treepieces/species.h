@@ -6,7 +6,7 @@
 /* ---- species: fields --------------------------------------------------------------------- */
 
 /* One table drives reading, printing and checking. */
-typedef enum tpc_kind { TPC_REAL, TPC_WHOLE, TPC_ENVELOPE, TPC_LEAF } tpc_kind;
+typedef enum tpc_kind { TPC_REAL, TPC_WHOLE, TPC_ENVELOPE, TPC_LEAF, TPC_CLOUD, TPC_BARK } tpc_kind;
 
 typedef struct tpc_field {
     const char *key;
@@ -32,11 +32,13 @@ static const tpc_field tpc_fields[] = {
     TPC_FIELD(shade, TPC_REAL, 1, 0, 1e6f),
     TPC_FIELD(clearance, TPC_REAL, 1, 0, 10),
     TPC_FIELD(stiffness, TPC_REAL, 1, 0.01f, 100),
-    TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_BLOSSOM),
+    TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_COMPOUND),
     TPC_FIELD(leaf_count, TPC_WHOLE, 1, 0, 256),
     TPC_FIELD(leaf_size, TPC_REAL, 1, 0.01f, 4),
+    TPC_FIELD(cloud_kind, TPC_CLOUD, 1, 0, TREEPIECES_CLOUD_STRIPS),
     TPC_FIELD(cloud, TPC_REAL, 1, 0.001f, 20),
     TPC_FIELD(cloud_flat, TPC_REAL, 1, 0.1f, 2),
+    TPC_FIELD(bark_kind, TPC_BARK, 1, 0, TREEPIECES_BARK_PLATES),
     TPC_FIELD(leaf_color, TPC_REAL, 3, 0, 1),
     TPC_FIELD(bark_color, TPC_REAL, 3, 0, 1),
 };
@@ -77,15 +79,19 @@ enum {
     TPC_NUMBER = 24 /* room for a number as text */
 };
 
-/* by treepieces_envelope and treepieces_leaf_shape */
+/* by treepieces_envelope, treepieces_leaf_shape, treepieces_cloud_kind and treepieces_bark_kind */
 static const char *const tpc_envelope_names[] = {"free", "ellipsoid", "cone", "cylinder", NULL};
-static const char *const tpc_leaf_names[] = {"oval",  "lobed",  "lance", "heart",
-                                             "needle", "blossom", NULL};
+static const char *const tpc_leaf_names[] = {"oval",   "lobed",   "lance",   "heart",   "needle",
+                                             "blossom", "palmate", "compound", NULL};
+static const char *const tpc_cloud_names[] = {"round", "layers", "shoots", "strips", NULL};
+static const char *const tpc_bark_names[] = {"furrowed", "smooth", "lenticels", "plates", NULL};
 
 /* The names of the values of a field; NULL: they are numbers. */
 static const char *const *tpc_names_of(const tpc_field *f) {
     return f->kind == TPC_ENVELOPE ? tpc_envelope_names
            : f->kind == TPC_LEAF   ? tpc_leaf_names
+           : f->kind == TPC_CLOUD  ? tpc_cloud_names
+           : f->kind == TPC_BARK   ? tpc_bark_names
                                    : NULL;
 }
 

@@ -10,7 +10,7 @@
    covers it, so that edges are antialiased without seams and rows are independent of each other.
    Lengths are in sides of the image, y points down. */
 enum {
-    TPC_TWIG = TREEPIECES_LEAF_BLOSSOM + 1, /* shape of a mark: a tapering stroke */
+    TPC_TWIG = TREEPIECES_LEAF_COMPOUND + 1, /* shape of a mark: a tapering stroke */
     TPC_MARKS = 1024,
     TPC_SAMPLES = 4 /* per pixel, across and down */
 };
@@ -43,9 +43,10 @@ typedef struct tpc_habit {
 } tpc_habit;
 
 static const tpc_habit tpc_habits[] = {
-    {9, 6, 6, 0.23f, 0.31f, 0.02f, 58, 0.10f},   {7, 5, 4, 0.31f, 0.34f, 0.01f, 55, 0.06f},
-    {15, 6, 9, 0.32f, 0.085f, 0.02f, 38, 0.14f}, {8, 6, 6, 0.20f, 0.44f, 0.05f, 62, 0.06f},
-    {0, 9, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.105f, 0.42f, 0.06f, 75, 0},
+    {9, 8, 8, 0.15f, 0.32f, 0.015f, 58, 0.10f},   {7, 7, 6, 0.20f, 0.34f, 0.01f, 55, 0.06f},
+    {15, 6, 11, 0.20f, 0.085f, 0.02f, 38, 0.14f}, {8, 8, 8, 0.125f, 0.44f, 0.04f, 62, 0.06f},
+    {0, 11, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.09f, 0.42f, 0.05f, 75, 0},
+    {6, 7, 5, 0.19f, 0.19f, 0.05f, 62, 0.04f},    {5, 5, 3, 0.32f, 0.30f, 0.02f, 55, 0.08f},
 };
 
 /* Half the width of a leaf at u of its length, over its maximum; side: 0..1 how far from the
@@ -76,7 +77,7 @@ static float tpc_outline(int shape, float u, float side) {
 
 /* The color of a leaf at u of its length and x across; half: half its width there. */
 static void tpc_leaf_color(const tpc_mark *m, float u, float x, float half, float color[3]) {
-    static const float veins[] = {9, 6, 11, 7}; /* by shape */
+    static const float veins[] = {9, 6, 11, 7}; /* by shape, of those before needles */
     const float across = x < 0 ? -x : x, edge = half > 0 ? across / half : 0;
     float shade = (x < 0 ? 1 - m->fold : 1 + m->fold) * (0.86f + 0.1f * u + 0.1f * edge), light = 0;
     if (m->shape < TREEPIECES_LEAF_NEEDLE) { /* side veins, and the bulges between them */
@@ -214,7 +215,7 @@ static void tpc_advance(const float a[2], const float heading[2], float degrees,
 
 /* The base color made a little lighter or darker, yellower or bluer, at random. */
 static void tpc_vary_color(tpc_spray *s, const float base[3], float color[3]) {
-    const float light = 1 + 0.13f * tpc_signed(&s->rng), warm = 0.09f * tpc_signed(&s->rng);
+    const float light = 1 + 0.18f * tpc_signed(&s->rng), warm = 0.12f * tpc_signed(&s->rng);
     color[0] = base[0] * light * (1 + warm);
     color[1] = base[1] * light;
     color[2] = base[2] * light * (1 - 1.5f * warm);
@@ -264,23 +265,65 @@ static void tpc_add_stem(tpc_spray *s, const tpc_stem *stem, float half, float h
     }
 }
 
+/* Add one blade of a leaf; NULL as of tpc_add_mark. */
+static tpc_mark *tpc_add_blade(tpc_spray *s, int outline, const float foot[2], const float heading[2],
+                               float degrees, float length, float wide, const float color[3]) {
+    const tpc_habit *habit = &tpc_habits[s->shape];
+    const float half = length * wide, bend = habit->bend * tpc_signed(&s->rng);
+    float tip[2];
+    tpc_advance(foot, heading, degrees, length, 0.015f + 0.75f * half, tip);
+    tpc_mark *blade = tpc_add_mark(s, outline, foot, tip, half, bend, color);
+    if (!blade) return NULL;
+    blade->fold = 0.09f * tpc_signed(&s->rng);
+    for (int k = 0; k < 3; k++) blade->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
+    return blade;
+}
+
+/* A palmate leaf: five lobes from one point, the middle one last, on top. */
+static void tpc_add_lobes(tpc_spray *s, const float foot[2], const float heading[2], float degrees,
+                          float length, const float color[3]) {
+    static const float angles[] = {-88, 88, -42, 42, 0}, lengths[] = {0.55f, 0.55f, 0.85f, 0.85f, 1};
+    for (int i = 0; i < 5; i++)
+        tpc_add_blade(s, TREEPIECES_LEAF_OVAL, foot, heading, degrees + angles[i],
+                      lengths[i] * length, tpc_habits[s->shape].width, color);
+}
+
+/* A compound leaf: pairs of leaflets on a stalk, and one at its end. */
+static void tpc_add_leaflets(tpc_spray *s, const float foot[2], const float heading[2], float degrees,
+                             float length, const float color[3]) {
+    enum { PAIRS = 4 };
+    const float leaflet = 0.36f * length, wide = tpc_habits[s->shape].width;
+    float end[2], at[2];
+    tpc_advance(foot, heading, degrees, length - leaflet, 0.05f, end);
+    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, foot, end, 0.003f, 0, color);
+    if (stalk) stalk->taper = 0.6f;
+    for (int i = 0; i < 2 * PAIRS; i++) {
+        const int pair = i / 2;
+        const float along = 0.25f + 0.7f * (float)pair / (float)(PAIRS - 1);
+        for (int k = 0; k < 2; k++) at[k] = txm_lerpf(foot[k], end[k], along);
+        tpc_add_blade(s, TREEPIECES_LEAF_OVAL, at, heading, degrees + (i % 2 ? -55.0f : 55.0f), leaflet,
+                      wide, color);
+    }
+    tpc_add_blade(s, TREEPIECES_LEAF_OVAL, end, heading, degrees, leaflet, wide, color);
+}
+
 /* Add a leaf with its petiole, seen roughly from above. */
 static void tpc_add_leaf(tpc_spray *s, int shape, const float at[2], const float heading[2],
                          float degrees, float size, const float base[3]) {
     const tpc_habit *habit = &tpc_habits[shape];
-    float foot[2], tip[2], color[3];
-    const float length = habit->length * size * (0.88f + 0.24f * txm_rng_float(&s->rng));
-    const float half = length * habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
-    const float bend = habit->bend * tpc_signed(&s->rng), margin = 0.015f + 0.75f * half;
+    float foot[2], color[3];
+    const float length = habit->length * size * (0.85f + 0.3f * txm_rng_float(&s->rng));
+    const float wide = habit->width * (0.72f + 0.34f * txm_rng_float(&s->rng));
     tpc_vary_color(s, base, color);
     tpc_advance(at, heading, degrees, habit->petiole * size + 0.01f, 0.01f, foot);
-    tpc_advance(foot, heading, degrees + 8 * tpc_signed(&s->rng), length, margin, tip);
-    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.004f, 0, color);
+    tpc_mark *stalk = tpc_add_mark(s, TPC_TWIG, at, foot, 0.003f, 0, color);
     if (stalk) stalk->taper = 0.7f;
-    tpc_mark *leaf = tpc_add_mark(s, shape, foot, tip, half, bend, color);
-    if (!leaf) return;
-    leaf->fold = 0.09f * tpc_signed(&s->rng);
-    for (int k = 0; k < 3; k++) leaf->tip[k] = color[k] * (k == 2 ? 1.0f : 1.08f);
+    const float lean = 8 * tpc_signed(&s->rng);
+    if (shape == TREEPIECES_LEAF_PALMATE)
+        tpc_add_lobes(s, foot, heading, degrees + lean, length, color);
+    else if (shape == TREEPIECES_LEAF_COMPOUND)
+        tpc_add_leaflets(s, foot, heading, degrees + lean, length, color);
+    else tpc_add_blade(s, shape, foot, heading, degrees + lean, length, wide, color);
 }
 
 /* Add a flower: five petals and the stamens, seen obliquely. */
@@ -367,7 +410,22 @@ static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
     }
 }
 
-/* Add all marks of the spray: a stem upwards from the middle of the lower side, twigs on both
+/* A spray for hanging strips: long shoots side by side, of different lengths. */
+static void tpc_make_strips(tpc_spray *s) {
+    enum { SHOOTS = 6, LEAVES = 20 };
+    for (int i = 0; i < SHOOTS; i++) {
+        const float x = ((float)i + 0.5f + 0.3f * tpc_signed(&s->rng)) / (float)SHOOTS;
+        tpc_stem stem = {{0, 1}, {0, 0}, 0};
+        stem.from[0] = 0.5f + 0.86f * (x - 0.5f);
+        stem.to[0] = txm_clampf(stem.from[0] + 0.06f * tpc_signed(&s->rng), 0.08f, 0.92f);
+        stem.to[1] = 0.08f + 0.4f * txm_rng_float(&s->rng) * txm_rng_float(&s->rng);
+        stem.bend = 0.025f * tpc_signed(&s->rng);
+        tpc_add_stem(s, &stem, 0.006f, 0.002f);
+        tpc_add_foliage(s, &stem, LEAVES, 0.02f, 0.85f);
+    }
+}
+
+/* A spray for all other clouds: a stem upwards from the middle of the lower side, twigs on both
    sides. */
 static void tpc_make_spray(tpc_spray *s) {
     const tpc_habit *habit = &tpc_habits[s->shape];
@@ -377,22 +435,22 @@ static void tpc_make_spray(tpc_spray *s) {
     stem.to[0] += 0.06f * tpc_signed(&s->rng);
     stem.to[1] = top;
     stem.bend = 0.05f * tpc_signed(&s->rng);
-    tpc_add_stem(s, &stem, 0.011f, 0.004f);
+    tpc_add_stem(s, &stem, 0.010f, 0.003f);
     for (int i = 0; i < habit->twigs; i++) {
-        const float along = 0.05f + 0.7f * (float)i / (float)habit->twigs;
-        const float side = i % 2 ? -1.0f : 1.0f, length = 0.5f * (1.05f - 0.6f * along);
+        const float along = 0.05f + 0.75f * (float)i / (float)habit->twigs;
+        const float side = i % 2 ? -1.0f : 1.0f, length = 0.52f * (1.05f - 0.6f * along);
         const float angle = side * (66 - 24 * along) + 5 * tpc_signed(&s->rng);
         tpc_stem twig;
         float heading[2];
         tpc_stem_at(&stem, along, twig.from, heading);
         tpc_advance(twig.from, heading, angle, length, 0.12f, twig.to);
         twig.bend = -0.08f * side;
-        tpc_add_stem(s, &twig, 0.007f, 0.003f);
+        tpc_add_stem(s, &twig, 0.006f, 0.0025f);
         if (is_needle) tpc_add_needles(s, &twig, 0.08f);
-        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.3f, 0.85f);
+        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.25f, 0.85f);
     }
     if (is_needle) tpc_add_needles(s, &stem, 0.03f);
-    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 1);
+    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 0.88f);
 }
 
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
@@ -412,9 +470,12 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     status = spray.marks ? tpc_new_picture(&out, &arena, env, &spray.out)
                          : txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the leaves");
     spray.species = species;
-    spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_BLOSSOM);
+    spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_COMPOUND);
     spray.rng = txm_rng_make(seed, 0x59a7);
-    if (status == TXM_OK) tpc_make_spray(&spray);
+    const int is_needle = spray.shape == TREEPIECES_LEAF_NEEDLE;
+    if (status == TXM_OK && species->cloud_kind == TREEPIECES_CLOUD_STRIPS && !is_needle)
+        tpc_make_strips(&spray);
+    else if (status == TXM_OK) tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {
         spray.first_row = y;
         if (txm_progress(env, (float)y / (float)out.height, "leaves"))

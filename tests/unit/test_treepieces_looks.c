@@ -4,7 +4,8 @@
 
 #include "growkit.h"
 
-enum { SHAPES = TREEPIECES_LEAF_BLOSSOM + 1, SIDE = 96, VIEW = 72, MOST_CARDS = 256 };
+enum { SHAPES = TREEPIECES_LEAF_COMPOUND + 1, KINDS = TREEPIECES_CLOUD_STRIPS + 1 };
+enum { SIDE = 96, VIEW = 72, MOST_CARDS = 256 };
 
 static txm_image make_image(int width, int height, int channels, txm_sample sample) {
     const size_t pixel = (size_t)channels * txm_sample_bytes(sample);
@@ -60,11 +61,12 @@ static void test_cloud(void **state) {
     static const int counts[] = {1, 2, 5, 40, MOST_CARDS};
     treepieces_card cards[MOST_CARDS];
     /* a step without a common divisor meets all values of each list */
-    for (int i = 0; i < SHAPES * 3 * 4 * 5; i += tk_full() ? 1 : 7) {
+    for (int i = 0; i < KINDS * 3 * 4 * 5; i += tk_full() ? 1 : 7) {
         treepieces_species s = shaped(i % SHAPES);
-        s.leaf_size = sizes[i / SHAPES % 3];
-        s.cloud_flat = flats[i / SHAPES / 3 % 4];
-        s.leaf_count = counts[i / SHAPES / 12];
+        s.cloud_kind = i % KINDS;
+        s.leaf_size = sizes[i / KINDS % 3];
+        s.cloud_flat = flats[i / KINDS / 3 % 4];
+        s.leaf_count = counts[i / KINDS / 12];
         for (uint32_t look = 0; look < 3; look++) {
             assert_int_equal(treepieces_cloud(&s, look, NULL), s.leaf_count);
             assert_int_equal(treepieces_cloud(&s, look, cards), s.leaf_count);
@@ -87,8 +89,9 @@ static void test_looks(void **state) {
     (void)state;
     enum { LOOKS = 16 };
     treepieces_card cards[MOST_CARDS];
-    for (int shape = 0; shape < SHAPES; shape++) {
-        const treepieces_species s = shaped(shape);
+    for (int kind = 0; kind < KINDS; kind++) {
+        treepieces_species s = oak;
+        s.cloud_kind = kind;
         const size_t bytes = (size_t)s.leaf_count * sizeof *cards;
         uint64_t hashes[LOOKS];
         for (uint32_t look = 0; look < LOOKS; look++) {
@@ -109,8 +112,9 @@ static void test_cloud_spread(void **state) {
     (void)state;
     enum { LOOKS = 64 };
     treepieces_card cards[MOST_CARDS];
-    for (int shape = 0; shape < SHAPES; shape++) {
-        treepieces_species s = shaped(shape);
+    for (int kind = 0; kind < TREEPIECES_CLOUD_STRIPS; kind++) {
+        treepieces_species s = oak;
+        s.cloud_kind = kind;
         s.cloud_flat = 0.5f;
         s.leaf_size = 0.3f;
         double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
@@ -133,6 +137,42 @@ static void test_cloud_spread(void **state) {
         assert_true(square[1] < 0.5 * square[0] && square[1] < 0.5 * square[2]);
         assert_true(square[0] < 1.3 * square[2] && square[2] < 1.3 * square[0]);
     }
+}
+
+/* Strips hang, layers lie flatter than the rest, and all but strips grow outwards. */
+static void test_cloud_kinds(void **state) {
+    (void)state;
+    enum { LOOKS = 32 };
+    treepieces_card cards[MOST_CARDS];
+    double down[KINDS], lying[KINDS], outwards[KINDS];
+    for (int kind = 0; kind < KINDS; kind++) {
+        treepieces_species s = oak;
+        s.cloud_kind = kind;
+        s.cloud_flat = kind == TREEPIECES_CLOUD_STRIPS ? 2 : 0.6f;
+        long all = 0;
+        down[kind] = lying[kind] = outwards[kind] = 0;
+        for (uint32_t look = 0; look < LOOKS; look++) {
+            const int count = treepieces_cloud(&s, look, cards);
+            for (int k = 0; k < count; k++, all++) {
+                const treepieces_card *c = &cards[k];
+                const double high = sqrt((double)dot(c->up, c->up)), wide = sqrt((double)dot(c->right, c->right));
+                const double across = (double)(c->up[2] * c->right[0] - c->up[0] * c->right[2]);
+                down[kind] -= (double)c->up[1] / high;
+                lying[kind] += fabs(across) / (high * wide);
+                outwards[kind] += dot(c->up, c->center) > 0;
+            }
+        }
+        down[kind] /= (double)all;
+        lying[kind] /= (double)all;
+        outwards[kind] /= (double)all;
+    }
+    assert_true(down[TREEPIECES_CLOUD_STRIPS] > 0.95);
+    assert_true(lying[TREEPIECES_CLOUD_STRIPS] < 0.25);
+    for (int kind = 0; kind < TREEPIECES_CLOUD_STRIPS; kind++) {
+        assert_true(fabs(down[kind]) < 0.5);
+        assert_true(outwards[kind] > 0.7);
+    }
+    assert_true(lying[TREEPIECES_CLOUD_LAYERS] > lying[TREEPIECES_CLOUD_ROUND] + 0.1);
 }
 
 /* ---- drawn leaves ------------------------------------------------------------------------ */
@@ -350,7 +390,7 @@ static int agrees(const treepieces_impostor_desc *d, const txm_image *color,
         best = z;
         seen = texel;
         const double square = x * x + y * y + z * z;
-        shade = light_of(d, &d->cards[i]) * (0.65 + 0.35 * (square < 1 ? square : 1));
+        shade = light_of(d, &d->cards[i]) * (0.75 + 0.25 * (square < 1 ? square : 1));
     }
     if (!seen) return p[3] == 0;
     if (p[3] != 255 || fabs((double)depth_at(depth, column, row) - best) > 1e-3) return 0;
@@ -567,18 +607,40 @@ static grown grow_three(const treepieces_species *species) {
     return grow_posed(&d, 0.1f, 4);
 }
 
-/* Card `card` of the cluster, as vertices 4 i.. of the mesh. */
-static void check_baked(const grown *g, const treepieces_tree *tree,
+/* v as the cloud of a cluster is turned about y */
+static void turn_about(const treepieces_cluster *cluster, const float v[3], float out[3]) {
+    const double angle = (cluster->look >> 8 & 255u) * 6.283185307179586 / 256;
+    out[0] = (float)(cos(angle) * (double)v[0] + sin(angle) * (double)v[2]);
+    out[1] = v[1];
+    out[2] = (float)(cos(angle) * (double)v[2] - sin(angle) * (double)v[0]);
+}
+
+/* Card `card` of the cluster, as vertices 4 i.. of the mesh; crown: the mean of the clusters. */
+static void check_baked(const grown *g, const treepieces_tree *tree, const double crown[3],
                         const treepieces_cluster *cluster, const treepieces_card *card,
                         const treepieces_mesh *m, size_t i) {
     const float *bone = g->bones + TREEPIECES_BONE * (size_t)cluster->node;
+    float middle[3], right[3], up[3], own[3], outward[3], normal[3], size = 0;
     int seen = 0;
+    turn_about(cluster, card->center, middle);
+    turn_about(cluster, card->right, right);
+    turn_about(cluster, card->up, up);
+    turn_about(cluster, card->normal, own);
+    for (int a = 0; a < 3; a++) {
+        const float at = bone[4 * a + 3] + cluster->along * bone[4 * a + 1] + cluster->radius * middle[a];
+        outward[a] = at - (float)crown[a];
+    }
+    for (int a = 0; a < 3; a++)
+        normal[a] = 0.8f * outward[a] / sqrtf(dot(outward, outward)) + 0.6f * own[a];
+    size = sqrtf(dot(normal, normal));
+    for (int a = 0; a < 3; a++) normal[a] /= size;
     for (size_t v = 4 * i; v < 4 * i + 4; v++) {
         assert_int_equal(m->joints[4 * v], cluster->node - tree->first_node);
         assert_true(m->weights[4 * v] == 1);
         for (size_t k = 1; k < 4; k++) assert_true(m->weights[4 * v + k] == 0);
         for (size_t k = 1; k < 4; k++) assert_int_equal(m->joints[4 * v + k], 0);
-        assert_memory_equal(m->normals + 3 * v, card->normal, sizeof card->normal);
+        assert_true(dot(m->normals + 3 * v, normal) > 0.9999f);
+        assert_memory_equal(m->normals + 3 * v, m->normals + 12 * i, 3 * sizeof(float));
     }
     for (size_t c = 6 * i; c < 6 * i + 6; c++) { /* where the picture's corner says */
         const float s = 2 * m->uvs[2 * c] - 1, t = 1 - 2 * m->uvs[2 * c + 1];
@@ -588,7 +650,7 @@ static void check_baked(const grown *g, const treepieces_tree *tree,
         seen |= 1 << (v % 4);
         for (int a = 0; a < 3; a++) {
             const float center = bone[4 * a + 3] + cluster->along * bone[4 * a + 1];
-            const float off = card->center[a] + s * card->right[a] + t * card->up[a];
+            const float off = middle[a] + s * right[a] + t * up[a];
             assert_true(fabsf(m->positions[3 * v + (uint32_t)a] - center - cluster->radius * off) <
                         1e-4f * (1 + fabsf(center)));
         }
@@ -609,12 +671,19 @@ static void test_bake_leaves(void **state) {
                          TXM_OK);
         assert_int_equal(m->vertex_count, 4 * (size_t)oak.leaf_count * t->cluster_count);
         assert_int_equal(m->triangle_count, 2 * (size_t)oak.leaf_count * t->cluster_count);
+        double crown[3] = {0, 0, 0};
+        for (uint32_t i = 0; i < t->cluster_count; i++) {
+            const treepieces_cluster *c = &g.forest->clusters[t->first_cluster + i];
+            const float *bone = g.bones + TREEPIECES_BONE * (size_t)c->node;
+            for (int a = 0; a < 3; a++)
+                crown[a] += (double)(bone[4 * a + 3] + c->along * bone[4 * a + 1]) / t->cluster_count;
+        }
         for (uint32_t i = 0; i < t->cluster_count; i++) {
             const treepieces_cluster *cluster = &g.forest->clusters[t->first_cluster + i];
             const int count =
                 treepieces_cloud(&oak, cluster->look % (uint32_t)looks[tree], cards);
             for (int k = 0; k < count; k++)
-                check_baked(&g, t, cluster, &cards[k], m, (size_t)i * (size_t)count + (size_t)k);
+                check_baked(&g, t, crown, cluster, &cards[k], m, (size_t)i * (size_t)count + (size_t)k);
         }
         treepieces_mesh_free(m);
     }
@@ -694,8 +763,8 @@ static float at(const txm_image *image, int x, int y, int c) {
 /* All tiles have the same border and different insides; the same seed gives the same tiles. */
 static void test_draw_bark(void **state) {
     (void)state;
-    static const char *const names[] = {"oak", "birch"};
-    for (int i = 0; i < 2; i++) {
+    static const char *const names[] = {"oak", "beech", "birch", "almond", "pine"}; /* all kinds */
+    for (int i = 0; i < 5; i++) {
         txm_image tiles[TILES], again[TILES];
         draw_tiles(tiles, TILES, names[i], 3, TXM_U8);
         draw_tiles(again, TILES, names[i], 3, TXM_U8);
@@ -889,7 +958,7 @@ static void test_bark_refusals(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cloud),           cmocka_unit_test(test_looks),
-        cmocka_unit_test(test_cloud_spread),    cmocka_unit_test(test_leaves),
+        cmocka_unit_test(test_cloud_spread), cmocka_unit_test(test_cloud_kinds),    cmocka_unit_test(test_leaves),
         cmocka_unit_test(test_leaves_repeat),   cmocka_unit_test(test_leaves_sizes),
         cmocka_unit_test(test_leaves_refusals), cmocka_unit_test(test_impostor),
         cmocka_unit_test(test_impostor_behind), cmocka_unit_test(test_impostor_card),
