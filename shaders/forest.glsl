@@ -10,12 +10,16 @@
                        the impostors: every leaf cloud along the view direction, each into its layer
      CLOUD_VERTEX, CLOUD_FRAGMENT
                        one instanced draw call for all clusters of leaves, with the impostors' depth
+     NEAR_VERTEX, NEAR_FRAGMENT
+                       the cards themselves of the clusters near the camera
+     SHADOW_FRAGMENT   pieces in the picture of shadows; clusters: CLOUD_FRAGMENT with SHADOW defined
      LAND_VERTEX, LAND_FRAGMENT
                        ground and sky: one triangle that covers the picture                      */
 
 layout(std140, binding = 0) uniform frame_block {
     mat4 view_projection;
-    vec4 eye;
+    mat4 sun_projection; /* of the picture of shadows */
+    vec4 eye;     /* w: up to this distance leaves are cards, metres */
     vec4 right;   /* w: tangent of half the horizontal field of view */
     vec4 up;      /* w: the same, vertical */
     vec4 forward; /* w: number of leaf clouds of a species */
@@ -25,7 +29,7 @@ layout(std140, binding = 0) uniform frame_block {
     vec4 lod;     /* maximum level, half distance, shape of Phong tessellation, pixels of the sheet */
 } frame;
 
-/* a word per node: bits 0 to 7 the species, above a random number per tree */
+/* a word per node: bits 0 to 3 the species, 4 to 7 its kind of bark, above a random number per tree */
 layout(std430, binding = 4) readonly buffer look_buffer { uint looks[]; };
 /* treepieces_cluster: node, along, radius, look; floats as their bits */
 layout(std430, binding = 5) readonly buffer cluster_buffer { uvec4 clusters[]; };
@@ -35,19 +39,56 @@ layout(binding = 1) uniform sampler2DArray leaves;
 layout(binding = 2) uniform sampler2DArray impostors;
 layout(binding = 3) uniform sampler2DArray depths;
 layout(binding = 4) uniform sampler3D light; /* that reaches a place: from the sun, from the sky */
+layout(binding = 6) uniform sampler2D shadows; /* depth of what the sun sees */
 
 uniform int kind;
 
 /* ---- light, for all fragment shaders ---- */
 
-const vec3 sun_color = vec3(1.0, 0.85, 0.62) * 3.0;
-const vec3 sky_color = vec3(0.48, 0.66, 1.0) * 0.75;
+const vec3 sun_color = vec3(1.0, 0.86, 0.66) * 3.3;
+const vec3 sky_color = vec3(0.50, 0.66, 1.0) * 0.72;
 const vec3 land_color = vec3(0.25, 0.26, 0.12);
+
+float hash(vec2 at) {
+    uvec2 p = uvec2(ivec2(floor(at)));
+    uint h = p.x * 0x9e3779b9u ^ p.y * 0x85ebca6bu;
+    h = (h ^ h >> 15) * 0x2c1b3c6du;
+    h = (h ^ h >> 12) * 0x297a2d39u;
+    return float((h ^ h >> 15) & 0xffffu) / 65535.0;
+}
 
 vec2 light_at(vec3 place) {
     vec2 open = texture(light, (place - frame.box_low.xyz) * frame.box_scale.xyz).rg;
     return max(open, vec2(0.03, 0.2)); /* indirect light */
 }
+
+#if defined(PIECE_FRAGMENT) || defined(CLOUD_FRAGMENT) || defined(NEAR_FRAGMENT) || defined(LAND_FRAGMENT)
+/* How much of the sun is visible from a place, 0..1, by the picture of shadows. Shadows are the softer
+   the further away what casts them is: `least` to `most` metres. bias: metres that do not shade. */
+float sun_at(vec3 place, float bias, float least, float most) {
+    vec3 at = (frame.sun_projection * vec4(place, 1.0)).xyz * 0.5 + 0.5;
+    mat3 rows = transpose(mat3(frame.sun_projection)) * 0.5; /* pictures per metre */
+    vec2 size = vec2(length(rows[0]), length(rows[1]));
+    float deep = length(rows[2]), turn = 6.283 * hash(gl_FragCoord.xy), above = 0.0, count = 0.0;
+    if (any(greaterThan(abs(at.xy - 0.5), vec2(0.5)))) return 1.0;
+    at.z -= bias * deep;
+    for (float k = 0.0; k < 6.0; k++) {
+        float angle = turn + 2.4 * k, far = most * sqrt((k + 0.5) / 6.0);
+        float depth = textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r;
+        if (depth < min(at.z, 1.0)) {
+            above += at.z - depth;
+            count++;
+        }
+    }
+    if (count == 0.0) return 1.0;
+    float soft = clamp(0.025 * above / (count * deep), least, most), lit = 0.0;
+    for (float k = 0.0; k < 10.0; k++) {
+        float angle = turn + 2.4 * k, far = soft * sqrt((k + 0.5) / 10.0);
+        lit += float(textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r >= min(at.z, 1.0));
+    }
+    return lit / 10.0;
+}
+#endif
 
 vec3 sky_towards(vec3 way) {
     float height = max(way.y, 0.0), glow = max(dot(way, frame.sun.xyz), 0.0);
@@ -66,14 +107,6 @@ vec4 seen(vec3 color, vec3 place) {
     return vec4(pow(clamp(color, 0.0, 1.0), vec3(1.0 / 2.2)), 1.0);
 }
 
-float hash(vec2 at) {
-    uvec2 p = uvec2(ivec2(floor(at)));
-    uint h = p.x * 0x9e3779b9u ^ p.y * 0x85ebca6bu;
-    h = (h ^ h >> 15) * 0x2c1b3c6du;
-    h = (h ^ h >> 12) * 0x297a2d39u;
-    return float((h ^ h >> 15) & 0xffffu) / 65535.0;
-}
-
 float noise(vec2 at) {
     vec2 f = fract(at), t = f * f * (3.0 - 2.0 * f);
     return mix(mix(hash(at), hash(at + vec2(1, 0)), t.x),
@@ -89,11 +122,13 @@ layout(location = 2) in vec3 normal;
 layout(location = 3) in vec4 weights;
 out vec3 vertex_place, vertex_normal;
 out int vertex_instance;
+out float vertex_radius; /* of the stem */
 
 void main() {
     treepieces_instance it = treepieces_find(kind, gl_InstanceID);
     treepieces_skin(kind, it, rim, position, normal, weights, vertex_place, vertex_normal);
     vertex_instance = gl_InstanceID;
+    vertex_radius = sqrt(treepieces_columns(rim < 0 ? it.own : it.children[rim / 6]).x);
 }
 #endif
 
@@ -101,14 +136,17 @@ void main() {
 layout(vertices = 4) out;
 in vec3 vertex_place[], vertex_normal[];
 in int vertex_instance[];
+in float vertex_radius[];
 out vec3 corner_place[], corner_normal[];
+out float corner_radius[];
 patch out vec4 tile_box;
-patch out int tile_layer, patch_instance, patch_quad;
+patch out int tile_layer, tile_kind, patch_instance, patch_quad;
 patch out float patch_level;
 
 void main() {
     corner_place[gl_InvocationID] = vertex_place[gl_InvocationID];
     corner_normal[gl_InvocationID] = vertex_normal[gl_InvocationID];
+    corner_radius[gl_InvocationID] = vertex_radius[gl_InvocationID];
     if (gl_InvocationID == 0) {
         treepieces_lod lod = treepieces_lod(frame.eye.xyz, frame.lod.x, frame.lod.y);
         vec3 a = vertex_place[0], b = vertex_place[1], c = vertex_place[2], d = vertex_place[3];
@@ -124,7 +162,8 @@ void main() {
         uint own = treepieces_records[treepieces_kinds[kind].first +
                                       uint(vertex_instance[0]) * treepieces_kinds[kind].stride];
         tile_box = tile.box;
-        tile_layer = tile.layer + 5 * int(looks[own] & 255u); /* a sheet has 5 layers */
+        tile_layer = tile.layer + 5 * int(looks[own] & 15u); /* a sheet has 5 layers */
+        tile_kind = int(looks[own] >> 4 & 15u);
         patch_instance = vertex_instance[0];
         patch_quad = gl_PrimitiveID;
     }
@@ -134,11 +173,12 @@ void main() {
 #ifdef PIECE_EVALUATION
 layout(quads, equal_spacing, cw) in;
 in vec3 corner_place[], corner_normal[];
+in float corner_radius[];
 patch in vec4 tile_box;
-patch in int tile_layer, patch_instance, patch_quad;
+patch in int tile_layer, tile_kind, patch_instance, patch_quad;
 patch in float patch_level;
 precise out vec3 place, normal;
-out vec2 tile_at;
+out vec2 tile_at, stem; /* stem: its radius, metres; kind of bark */
 flat out int layer;
 flat out float level;
 #ifdef FEEDBACK
@@ -151,7 +191,10 @@ void main() {
     vec3 n[4] = vec3[4](corner_normal[0], corner_normal[1], corner_normal[2], corner_normal[3]);
     treepieces_patch_point(p, n, frame.lod.z, gl_TessCoord.xy, place, normal);
     gl_Position = frame.view_projection * vec4(place, 1.0);
-    tile_at = mix(tile_box.xy, tile_box.zw, gl_TessCoord.xy);
+    vec2 t = gl_TessCoord.xy;
+    tile_at = mix(tile_box.xy, tile_box.zw, t);
+    stem.x = mix(mix(corner_radius[0], corner_radius[3], t.x), mix(corner_radius[1], corner_radius[2], t.x), t.y);
+    stem.y = float(tile_kind);
     layer = tile_layer;
     level = patch_level;
 #ifdef FEEDBACK
@@ -166,11 +209,11 @@ void main() {
 layout(triangles) in;
 layout(triangle_strip, max_vertices = 3) out;
 in vec3 place[], normal[];
-in vec2 tile_at[];
+in vec2 tile_at[], stem[];
 flat in int layer[];
 flat in float level[];
 out vec3 wire_place, wire_normal, wire_corner;
-out vec2 wire_tile_at;
+out vec2 wire_tile_at, wire_stem;
 flat out int wire_layer;
 flat out float wire_level;
 
@@ -180,6 +223,7 @@ void main() {
         wire_place = place[k];
         wire_normal = normal[k];
         wire_tile_at = tile_at[k];
+        wire_stem = stem[k];
         wire_layer = layer[k];
         wire_level = level[k];
         wire_corner = vec3(k == 0, k == 1, k == 2);
@@ -193,20 +237,53 @@ void main() {
 #define place wire_place
 #define normal wire_normal
 #define tile_at wire_tile_at
+#define stem wire_stem
 #define layer wire_layer
 #define level wire_level
 in vec3 wire_corner;
 #endif
 in vec3 place, normal;
-in vec2 tile_at;
+in vec2 tile_at, stem;
 flat in int layer;
 flat in float level;
 out vec4 color;
+
+/* What a tile is too small for: furrows and plates of thick stems, as a height; blotches, dark ones on the
+   pale bark of birches; young bark, which is darker and browner; dirt near the ground. */
+vec4 aged(vec3 at, float radius, int kind, float pale) {
+    float young = 1.0 - smoothstep(0.012, 0.05, radius), light = smoothstep(0.3, 0.5, pale);
+    vec3 far = vec3(at.x + at.z, at.y, at.x - at.z); /* two planes along the stem */
+    float blotch = noise(far.xy / vec2(0.5, 0.35)) * 0.6 + noise(far.zy / vec2(0.13, 0.07) + 31.0) * 0.4;
+    vec3 color = vec3(0.8 + 0.4 * blotch);
+    float height = 0.0;
+    float thick = smoothstep(0.03, 0.09, radius); /* thin ones move in the wind, through the noise */
+    if (kind == 0 || kind == 3) {
+        vec2 size = clamp(radius, 0.03, 0.4) * (kind == 0 ? vec2(0.22, 1.1) : vec2(0.5, 0.75));
+        float one = abs(noise(far.xy / size + 2.0 * blotch) - 0.5);
+        float two = abs(noise(far.zy / size + 2.0 * blotch + 17.0) - 0.5);
+        float furrow = thick * (1.0 - smoothstep(0.0, kind == 0 ? 0.16 : 0.10, min(one, two)));
+        height = -furrow;
+        color *= 1.0 - 0.55 * furrow;
+        /* the plates of old pines are grey */
+        if (kind == 3) color = mix(color, color * vec3(0.62, 0.80, 1.0), smoothstep(0.10, 0.2, radius));
+    } else if (kind == 2) {
+        float scar = light * smoothstep(0.60, 0.68, noise(far.xy / vec2(0.11, 0.045) + 7.0) * 0.5 +
+                                                       noise(far.zy / vec2(0.3, 0.22) + 3.0) * 0.5);
+        scar = max(scar, light * 0.8 * smoothstep(1.2, 0.1, at.y + 1.6 * blotch - 0.6));
+        color = mix(color, vec3(0.06), 0.92 * scar);
+    }
+    color *= mix(vec3(1.0), vec3(0.55, 0.44, 0.36) * mix(1.0, 0.35, light), young);
+    return vec4(color * mix(0.75, 1.0, smoothstep(0.0, 0.8, at.y)), height);
+}
 
 void main() {
     vec3 n = normalize(normal), albedo = texture(bark, vec3(tile_at, layer)).rgb;
     /* bump mapping: the brightness of the bark as height, a tenth of a tile deep */
     float height = sqrt(dot(albedo, vec3(0.3, 0.6, 0.1)));
+    float pale = dot(textureLod(bark, vec3(0.5, 0.5, layer), 6.0).rgb, vec3(0.3, 0.6, 0.1));
+    vec4 old = aged(place, stem.x, int(stem.y + 0.5), pale);
+    albedo *= old.rgb;
+    height += 0.7 * old.w;
     vec3 across = dFdx(place), along = dFdy(place), a = cross(along, n), b = cross(n, across);
     vec2 tile_across = dFdx(tile_at), tile_along = dFdy(tile_at);
     float area = dot(across, a);
@@ -217,7 +294,8 @@ void main() {
 
     vec2 open = light_at(place + n * frame.box_low.w);
     float facing = max(dot(n, frame.sun.xyz), 0.0), skywards = 0.5 + 0.5 * n.y;
-    vec3 arriving = sun_color * facing * open.r + sky_color * mix(0.35, 1.0, skywards) * open.g +
+    float sun = facing > 0.0 ? sun_at(place + 0.02 * n, 0.06, 0.01, 0.15) : 0.0;
+    vec3 arriving = sun_color * facing * sun + sky_color * mix(0.35, 1.0, skywards) * open.g +
                     land_color * (1.0 - skywards) * (0.4 + 0.6 * open.r);
     arriving *= 0.55 + 0.45 * smoothstep(-0.1, 0.9, place.y); /* ambient occlusion near the ground */
 #ifdef WIRE
@@ -231,13 +309,21 @@ void main() {
 }
 #endif
 
+#ifdef SHADOW_FRAGMENT
+void main() {
+}
+#endif
+
 /* ---- impostors: leaf clouds along the view ---- */
 
-#ifdef CARD_VERTEX
+#if defined(CARD_VERTEX) || defined(NEAR_VERTEX)
 struct card_data {
     vec4 center, right, up, normal; /* w: layer, species, -, - */
 };
 layout(std430, binding = 6) readonly buffer card_buffer { card_data cards[]; };
+#endif
+
+#ifdef CARD_VERTEX
 out vec3 card_at;
 out vec2 card_leaf;
 flat out ivec2 card_what; /* layer, species */
@@ -302,11 +388,56 @@ void main() {
 
 /* ---- clusters of leaves ---- */
 
+#if defined(CLOUD_VERTEX) || defined(NEAR_VERTEX)
+/* a tint per tree, and a smaller variation per cloud */
+vec3 tint_of(uint look, uint cloud) {
+    float warm = float(look >> 8 & 255u) / 255.0 - 0.5, other = float(cloud >> 8 & 255u) / 255.0 - 0.5;
+    float bright = float(look >> 16 & 255u) / 255.0 - 0.5, own = float(cloud >> 16 & 255u) / 255.0 - 0.5;
+    return vec3(1.0 + 0.20 * warm + 0.16 * other, 1.0, 1.0 - 0.25 * warm) *
+           (1.0 + 0.20 * bright + 0.20 * own);
+}
+
+/* The normal of the crown's surface, as the light from the sky has it: towards where there is more;
+   shorter where that is not clear. */
+vec3 crown_normal(vec3 center, float radius) {
+    vec3 n, wide = (1.5 * frame.box_low.w + 0.6 * radius) * frame.box_scale.xyz;
+    vec3 at = (center - frame.box_low.xyz) * frame.box_scale.xyz;
+    for (int k = 0; k < 3; k++) {
+        vec3 off = vec3(k == 0, k == 1, k == 2) * wide;
+        n[k] = textureLod(light, at + off, 0.0).g - textureLod(light, at - off, 0.0).g;
+    }
+    return n / (length(n) + 0.03);
+}
+#endif
+
+#if defined(CLOUD_FRAGMENT) && !defined(SHADOW) || defined(NEAR_FRAGMENT)
+/* The light that a leaf sends to the eye. n: the crown's surface, with some of the cloud's */
+vec3 leaf_light(vec3 place, vec3 n) {
+    vec2 open = light_at(place + n * frame.box_low.w);
+    float sun = mix(sun_at(place, 0.12, 0.03, 0.2), open.r, 0.3);
+    float facing = clamp(0.30 + 0.70 * dot(n, frame.sun.xyz), 0.0, 1.0), skywards = 0.5 + 0.5 * n.y;
+    /* a leaf lit from behind is brighter and yellower than one that reflects */
+    float through = clamp(0.2 + 0.8 * dot(normalize(place - frame.eye.xyz), frame.sun.xyz), 0.0, 1.0);
+    return sun_color * sun * (0.85 * facing + 0.9 * through * vec3(1.0, 1.0, 0.25)) +
+           sky_color * mix(0.3, 1.0, skywards) * open.g * open.g * 1.3 +
+           land_color * 0.5 * (1.0 - skywards) * open.r;
+}
+#endif
+
+/* Near the camera cards replace impostors: within a seventh of that distance some pixels show one, some
+   the other. Is this one of those that show cards? */
+#if defined(CLOUD_FRAGMENT) || defined(NEAR_FRAGMENT)
+bool shows_cards(vec3 center) {
+    float share = (1.0 - distance(center, frame.eye.xyz) / max(frame.eye.w, 1e-3)) * 7.0;
+    return share > hash(gl_FragCoord.xy + 0.5) && frame.eye.w > 0.0;
+}
+#endif
+
 #ifdef CLOUD_VERTEX
 out vec2 at;
 flat out vec4 sphere;
 flat out int layer;
-flat out vec3 tint;
+flat out vec3 tint, crown;
 
 void main() {
     uvec4 c = clusters[gl_InstanceID];
@@ -315,12 +446,9 @@ void main() {
     vec3 center = treepieces_move_point(c.x, vec3(0.0, along, 0.0));
     at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
     sphere = vec4(center, radius);
-    layer = int((look & 255u) * clouds + c.w % clouds);
-    /* a tint per tree, and a smaller variation per cloud */
-    float warm = float(look >> 8 & 255u) / 255.0 - 0.5, other = float(c.w >> 8 & 255u) / 255.0 - 0.5;
-    float bright = float(look >> 16 & 255u) / 255.0 - 0.5;
-    tint = vec3(1.0 + 0.20 * warm + 0.10 * other, 1.0, 1.0 - 0.25 * warm) *
-           (1.0 + 0.20 * bright + 0.20 * other);
+    layer = int((look & 15u) * clouds + c.w % clouds);
+    tint = tint_of(look, c.w);
+    crown = crown_normal(center, radius);
     gl_Position = frame.view_projection *
                   vec4(center + radius * (at.x * frame.right.xyz + at.y * frame.up.xyz), 1.0);
 }
@@ -330,32 +458,70 @@ void main() {
 in vec2 at;
 flat in vec4 sphere;
 flat in int layer;
-flat in vec3 tint;
+flat in vec3 tint, crown;
+#ifndef SHADOW
 out vec4 color;
+#endif
 
 void main() {
     vec3 texel = vec3(at * 0.5 + 0.5, layer);
     vec4 leaf = texture(impostors, texel);
-    if (leaf.a < 0.4) discard;
+    float small = max(textureQueryLod(impostors, texel.xy).y, 0.0);
+    if (leaf.a * (1.0 + 0.25 * small) < 0.4 || shows_cards(sphere.xyz)) discard;
     vec4 near = textureGather(depths, texel);
     float depth = max(max(near.x, near.y), max(near.z, near.w));
     if (depth < -1.5) discard;
     mat3 view = mat3(frame.right.xyz, frame.up.xyz, frame.forward.xyz);
     gl_FragDepth = treepieces_impostor_depth(frame.view_projection, sphere.xyz, sphere.w, view,
                                              vec3(at, depth));
-
-    /* the impostor holds the shading of its cards; here: shadows of the crown, the orientation of the
-       cloud's surface, light shining through leaves from behind */
+#ifndef SHADOW
+    /* the impostor holds the shading of its cards; here: that of the crown */
     vec3 from_middle = view * vec3(at, -depth), place = sphere.xyz + sphere.w * from_middle;
     vec3 albedo = pow(leaf.rgb / leaf.a, vec3(2.2)) * tint;
-    vec2 open = light_at(place + frame.sun.xyz * frame.box_low.w);
-    vec3 n = normalize(from_middle + vec3(0.0, 0.3, 0.0));
-    float facing = 0.5 + 0.5 * dot(n, frame.sun.xyz), skywards = 0.5 + 0.5 * n.y;
-    float through = pow(max(dot(frame.forward.xyz, frame.sun.xyz), 0.0), 2.0);
-    vec3 arriving = sun_color * open.r * (0.75 * facing + 0.5 * through * vec3(0.9, 1.0, 0.3)) +
-                    sky_color * mix(0.4, 1.0, skywards) * open.g +
-                    land_color * 0.6 * (1.0 - skywards) * open.r;
-    color = seen(albedo * arriving, place);
+    vec3 n = normalize(1.2 * crown + 0.55 * from_middle + vec3(0.0, 0.25, 0.0));
+    color = seen(albedo * leaf_light(place, n), place);
+#endif
+}
+#endif
+
+#ifdef NEAR_VERTEX
+layout(std430, binding = 7) readonly buffer near_buffer { uvec2 near[]; }; /* cluster, card */
+out vec3 place, normal;
+out vec2 leaf;
+flat out vec3 tint, center;
+flat out float own_light;
+flat out int species;
+
+void main() {
+    uvec4 c = clusters[near[gl_InstanceID].x];
+    card_data card = cards[near[gl_InstanceID].y];
+    float along = uintBitsToFloat(c.y), radius = uintBitsToFloat(c.z);
+    vec2 side = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+    center = treepieces_move_point(c.x, vec3(0.0, along, 0.0));
+    vec3 at = card.center.xyz + side.x * card.right.xyz + side.y * card.up.xyz;
+    place = center + radius * at;
+    leaf = vec2(side.x, -side.y) * 0.5 + 0.5;
+    species = int(card.right.w);
+    tint = tint_of(looks[c.x], c.w);
+    normal = 1.2 * crown_normal(center, radius) + 0.55 * at + vec3(0.0, 0.25, 0.0);
+    own_light = 0.7 + 0.6 * clamp(0.35 + 0.65 * dot(card.normal.xyz, frame.sun.xyz), 0.0, 1.0);
+    gl_Position = frame.view_projection * vec4(place, 1.0);
+}
+#endif
+
+#ifdef NEAR_FRAGMENT
+in vec3 place, normal;
+in vec2 leaf;
+flat in vec3 tint, center;
+flat in float own_light;
+flat in int species;
+out vec4 color;
+
+void main() {
+    vec4 texel = texture(leaves, vec3(leaf, species));
+    if (texel.a < 0.5 || !shows_cards(center)) discard;
+    vec3 albedo = pow(texel.rgb * own_light, vec3(2.2)) * tint;
+    color = seen(albedo * leaf_light(place, normalize(normal)), place);
 }
 #endif
 
@@ -412,7 +578,8 @@ void main() {
     vec3 litter = vec3(0.075, 0.056, 0.030);
     vec3 albedo = mix(litter, grass, smoothstep(0.35, 0.65, open.g + 0.5 * sum + 0.05));
     albedo *= max(1.0 + 1.1 * sum, 0.25);
-    vec3 arriving = sun_color * frame.sun.y * open.r + sky_color * open.g;
+    float sun = sun_at(place, 0.03, 0.02, 0.5);
+    vec3 arriving = sun_color * frame.sun.y * sun * mix(0.75, 1.0, open.r) + sky_color * open.g;
     color = seen(albedo * arriving, place);
 }
 #endif

@@ -10,7 +10,7 @@ void *at_offset(size_t bytes) {
 static void fill_buffer(forest_gl *f, int binding, const void *data, size_t bytes) {
     glBindBuffer(GL_SHADER_STORAGE_BUFFER, f->buffers[binding]);
     glBufferData(GL_SHADER_STORAGE_BUFFER, (GLsizeiptr)(bytes ? bytes : 16), bytes ? data : NULL,
-                 binding == BONES ? GL_STREAM_DRAW : GL_STATIC_DRAW);
+                 binding == BONES || binding == NEAR ? GL_STREAM_DRAW : GL_STATIC_DRAW);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, (GLuint)binding, f->buffers[binding]);
 }
 
@@ -90,12 +90,14 @@ int upload_trees(forest_gl *f) {
         for (int t = 0; t < forest->tree_count; t++) {
             const treepieces_tree *tree = &forest->trees[t];
             const uint32_t look = (uint32_t)tree->species |
+                                  (uint32_t)f->species[tree->species].bark_kind << 4 |
                                   ((uint32_t)txm_hash(tree->seed + (uint64_t)t) & 0xffffffu) << 8;
             for (uint32_t i = 0; i < tree->node_count; i++) looks[tree->first_node + i] = look;
         }
         for (int i = 0; i < f->species_count * CLOUDS; i++) {
             const int s = i / CLOUDS;
             const int count = treepieces_cloud(&f->species[s], (uint32_t)(i % CLOUDS), made);
+            f->first_cards[i] = f->card_count;
             for (int k = 0; k < count; k++) {
                 card_data *card = &cards[f->card_count++];
                 memcpy(card->center, made[k].center, sizeof made[k].center);
@@ -106,6 +108,7 @@ int upload_trees(forest_gl *f) {
                 card->right[3] = (float)s;
             }
         }
+        f->first_cards[f->species_count * CLOUDS] = f->card_count;
         fill_buffer(f, LOOKS, looks, forest->node_count * sizeof *looks);
         fill_buffer(f, CARDS, cards, (size_t)f->card_count * sizeof *cards);
         fill_buffer(f, CLUSTERS, forest->clusters, forest->cluster_count * sizeof *forest->clusters);
@@ -117,6 +120,35 @@ int upload_trees(forest_gl *f) {
 
 void upload_bones(forest_gl *f) {
     fill_buffer(f, BONES, f->bones, f->forest->node_count * TREEPIECES_BONE * sizeof(float));
+}
+
+/* List the cards of the clusters near the camera: number of the cluster, number of the card. Returns
+   how many there are; those beyond MOST are left out, their impostors are as good. */
+int upload_near(forest_gl *f) {
+    enum { MOST = 1 << 17 };
+    const treepieces_forest *forest = f->forest;
+    int count = 0;
+    uint32_t *list = NULL;
+    for (int t = 0; t < forest->tree_count && f->o.cards > 0; t++) {
+        const treepieces_tree *tree = &forest->trees[t];
+        for (uint32_t i = 0; i < tree->cluster_count; i++) {
+            const uint32_t number = tree->first_cluster + i;
+            const treepieces_cluster *c = &forest->clusters[number];
+            const int cloud = tree->species * CLOUDS + (int)(c->look % CLOUDS);
+            float p[3];
+            axis_point(f, c->node, c->along, p);
+            for (int k = 0; k < 3; k++) p[k] -= f->frame.eye[k];
+            if (dot(p, p) > f->o.cards * f->o.cards) continue;
+            if (!list) list = (uint32_t *)allocate(f, MOST, 2 * sizeof *list);
+            for (int k = f->first_cards[cloud]; k < f->first_cards[cloud + 1] && list && count < MOST; k++) {
+                list[2 * count] = number;
+                list[2 * count++ + 1] = (uint32_t)k;
+            }
+        }
+    }
+    if (count) fill_buffer(f, NEAR, list, (size_t)count * 2 * sizeof *list);
+    free(list);
+    return count;
 }
 
 /* An array texture. */
@@ -145,10 +177,11 @@ static int upload_pictures(forest_gl *f) {
         glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, s * TREEPIECES_OWN, side, side, TREEPIECES_OWN,
                         GL_RGB, GL_UNSIGNED_BYTE, f->sheets[s].pixels);
     glGenerateMipmap(GL_TEXTURE_2D_ARRAY);
-    make_array(f, LEAVES, GL_RGBA8, width, height, n, GL_NEAREST);
+    make_array(f, LEAVES, GL_RGBA8, width, height, n, GL_LINEAR_MIPMAP_LINEAR);
     for (int s = 0; s < n; s++)
         glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, s, width, height, 1, GL_RGBA, GL_UNSIGNED_BYTE,
                         f->leaves[s].pixels);
+    glGenerateMipmap(GL_TEXTURE_2D_ARRAY);
 
     /* the impostors, and the frame buffer that renders them */
     const GLenum targets[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
@@ -165,6 +198,23 @@ static int upload_pictures(forest_gl *f) {
     return 1;
 }
 
+/* The picture of shadows, all lit until draw_shadows draws it. */
+static void make_shadow_map(forest_gl *f) {
+    static const float far = 1;
+    glActiveTexture(GL_TEXTURE0 + SHADOWS);
+    glBindTexture(GL_TEXTURE_2D, f->textures[SHADOWS]);
+    glTexStorage2D(GL_TEXTURE_2D, 1, GL_DEPTH_COMPONENT24, SHADOW_SIDE, SHADOW_SIDE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    glBindFramebuffer(GL_FRAMEBUFFER, f->shadow_frame);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, f->textures[SHADOWS], 0);
+    glDrawBuffer(GL_NONE);
+    glReadBuffer(GL_NONE);
+    glClearBufferfv(GL_DEPTH, 0, &far);
+}
+
 static void create_objects(forest_gl *f) {
     glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
@@ -174,6 +224,7 @@ static void create_objects(forest_gl *f) {
     glGenBuffers(1, &f->indices);
     glGenTextures(TEXTURES, f->textures);
     glGenFramebuffers(1, &f->card_frame);
+    glGenFramebuffers(1, &f->shadow_frame);
     glGenVertexArrays(1, &f->array);
     glBindVertexArray(f->array);
     glBindBufferBase(GL_UNIFORM_BUFFER, 0, f->block);
@@ -182,6 +233,7 @@ static void create_objects(forest_gl *f) {
 /* All OpenGL objects, filled; program: argv[0]. */
 int upload_scene(forest_gl *f, const char *program) {
     create_objects(f);
+    make_shadow_map(f);
     return make_programs(f, program) && upload_pieces(f) && upload_trees(f) && upload_pictures(f) &&
            make_light(f);
 }

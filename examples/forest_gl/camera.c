@@ -31,10 +31,11 @@ void aim_camera(forest_gl *f, int width, int height) {
         d->forward[k] = -back[k];
     }
     d->eye[1] = txm_maxf(d->eye[1], 0.1f);
+    d->eye[3] = f->o.is_bare ? 0 : f->o.cards;
     d->right[3] = tan_right;
     d->up[3] = tan_up;
     d->forward[3] = CLOUDS;
-    d->box_scale[3] = 0.18f / (distance + wide + 30);
+    d->box_scale[3] = 0.1f / (distance + wide + 30);
     d->lod[0] = f->o.level;
     d->lod[1] = f->o.half;
     d->lod[2] = 0.6f;
@@ -54,6 +55,48 @@ void aim_camera(forest_gl *f, int width, int height) {
         m[2] = z[0] * v[2] + (column == 3 ? z[1] : 0);
         m[3] = -v[2];
     }
+    glBindBuffer(GL_UNIFORM_BUFFER, f->block);
+    glBufferData(GL_UNIFORM_BUFFER, sizeof *d, d, GL_STREAM_DRAW);
+}
+
+/* The uniform block of the sun's picture: parallel rays, all of the forest, no tessellation. */
+void aim_sun(forest_gl *f) {
+    frame_data *d = &f->frame;
+    const float *sun = d->sun, level = sqrtf(sun[0] * sun[0] + sun[2] * sun[2]);
+    const float right[3] = {sun[2] / level, 0, -sun[0] / level};
+    float axes[3][3];
+    for (int k = 0; k < 3; k++) {
+        axes[0][k] = right[k];
+        axes[2][k] = -sun[k]; /* depth grows away from the sun */
+    }
+    axes[1][0] = sun[1] * right[2] - sun[2] * right[1];
+    axes[1][1] = sun[2] * right[0] - sun[0] * right[2];
+    axes[1][2] = sun[0] * right[1] - sun[1] * right[0];
+    memset(d->view_projection, 0, sizeof d->view_projection);
+    d->view_projection[15] = 1;
+    for (int a = 0; a < 3; a++) {
+        float least = 1e9f, most = -1e9f;
+        for (int corner = 0; corner < 8; corner++) {
+            float p[3];
+            for (int k = 0; k < 3; k++) p[k] = corner >> k & 1 ? f->high[k] : f->low[k];
+            least = txm_minf(least, dot(p, axes[a]) - 1);
+            most = txm_maxf(most, dot(p, axes[a]) + 1);
+        }
+        for (int k = 0; k < 3; k++)
+            d->view_projection[4 * k + a] = 2 * axes[a][k] / (most - least);
+        d->view_projection[12 + a] = -(most + least) / (most - least);
+    }
+    for (int k = 0; k < 3; k++) {
+        d->right[k] = axes[0][k];
+        d->up[k] = axes[1][k];
+        d->forward[k] = axes[2][k];
+        d->eye[k] = 1e6f * sun[k];
+    }
+    d->eye[3] = 0;
+    d->forward[3] = CLOUDS;
+    d->lod[0] = d->lod[1] = 1;
+    d->lod[2] = 0;
+    d->lod[3] = (float)f->sheets[0].width;
     glBindBuffer(GL_UNIFORM_BUFFER, f->block);
     glBufferData(GL_UNIFORM_BUFFER, sizeof *d, d, GL_STREAM_DRAW);
 }

@@ -21,6 +21,7 @@ enum {
     LEAF_SIDE = 512,   /* pixels of a leaf picture                                              */
     CLOUDS = 8,        /* different leaf clouds of a species                                    */
     CLOUD_SIDE = 256,  /* pixels of an impostor                                                 */
+    SHADOW_SIDE = 3072, /* pixels of the picture that the sun sees                              */
     MAX_CELLS = 1200000 /* of the 3D texture of light                                           */
 };
 
@@ -35,6 +36,7 @@ typedef struct options {
     uint64_t seed;
     double time;                /* seconds                                                      */
     float wind, level, half;    /* m/s; of tessellation; metres over which it halves            */
+    float cards;                /* metres from the camera up to which leaves are drawn as cards  */
     float orbit[3];             /* azimuth, elevation in degrees; distance in metres, 0: all of
                                    the forest is visible                                        */
     float at[3];                /* the point that the camera orbits, if has_at                  */
@@ -44,6 +46,7 @@ typedef struct options {
 /* The uniform block frame_block of forest.glsl. */
 typedef struct frame_data {
     float view_projection[16]; /* column-major                                                  */
+    float sun_projection[16];  /* of the picture of shadows                                     */
     float eye[4], right[4], up[4], forward[4], sun[4], box_low[4], box_scale[4], lod[4];
 } frame_data;
 
@@ -58,9 +61,9 @@ typedef struct card_data {
 } card_data;
 
 /* bindings of buffers and of textures in the shaders */
-enum { BONES, RECORDS, KINDS, QUADS, LOOKS, CLUSTERS, CARDS, BUFFERS };
-enum { BARK, LEAVES, IMPOSTORS, DEPTHS, LIGHT, CARD_DEPTHS, TEXTURES };
-enum { PIECES, WIRE, CARD, CLOUD, LAND, PROGRAMS };
+enum { BONES, RECORDS, KINDS, QUADS, LOOKS, CLUSTERS, CARDS, NEAR, BUFFERS };
+enum { BARK, LEAVES, IMPOSTORS, DEPTHS, LIGHT, CARD_DEPTHS, SHADOWS, TEXTURES };
+enum { PIECES, WIRE, CARD, CLOUD, NEAR_CARD, LAND, PIECE_SHADOW, CLOUD_SHADOW, PROGRAMS };
 
 typedef struct forest_gl {
     options o;
@@ -87,8 +90,9 @@ typedef struct forest_gl {
 
     /* OpenGL: buffers.c, shaders.c */
     GLuint programs[PROGRAMS], buffers[BUFFERS], textures[TEXTURES];
-    GLuint block, vertices, indices, array, card_frame;
+    GLuint block, vertices, indices, array, card_frame, shadow_frame;
     int first_index[TREEPIECES_MAX_TYPES], card_count, draws;
+    int first_cards[MAX_SPECIES * CLOUDS + 1]; /* of each cloud                                 */
     EGLDisplay display;
 } forest_gl;
 
@@ -131,13 +135,16 @@ int upload_scene(forest_gl *f, const char *program);
 int upload_pieces(forest_gl *f);
 int upload_trees(forest_gl *f);
 void upload_bones(forest_gl *f);
+int upload_near(forest_gl *f);
 void *at_offset(size_t bytes);
 
 /* ---- camera.c: the view ---- */
 void choose_view(forest_gl *f);
 void aim_camera(forest_gl *f, int width, int height);
+void aim_sun(forest_gl *f);
 
 /* ---- frame.c: draw calls ---- */
+void draw_shadows(forest_gl *f);
 void draw_frame(forest_gl *f, GLuint target, int width, int height);
 
 /* ---- headless.c: pictures without a window ---- */

@@ -41,6 +41,26 @@ static void draw_pieces(forest_gl *f, GLuint program) {
     }
 }
 
+/* Draw what the sun sees of the forest as it stands now: once, as the wind moves shadows too little. The
+   impostors are drawn as seen from there. */
+void draw_shadows(forest_gl *f) {
+    const frame_data view = f->frame;
+    aim_sun(f);
+    f->has_impostors = 0;
+    if (!f->o.is_bare) draw_impostors(f);
+    glBindFramebuffer(GL_FRAMEBUFFER, f->shadow_frame);
+    glViewport(0, 0, SHADOW_SIDE, SHADOW_SIDE);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LEQUAL);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    draw_pieces(f, f->programs[PIECE_SHADOW]);
+    if (f->forest->cluster_count && !f->o.is_bare)
+        draw_strips(f, CLOUD_SHADOW, (int)f->forest->cluster_count);
+    f->has_impostors = 0;
+    memcpy(f->frame.sun_projection, f->frame.view_projection, sizeof view.view_projection);
+    memcpy(f->frame.view_projection, view.view_projection, sizeof view.view_projection);
+}
+
 /* Draw everything into a frame buffer of the given size. */
 void draw_frame(forest_gl *f, GLuint target, int width, int height) {
     f->draws = 0;
@@ -56,6 +76,8 @@ void draw_frame(forest_gl *f, GLuint target, int width, int height) {
     glDisable(GL_CULL_FACE);
     if (f->forest->cluster_count && !f->o.is_bare)
         draw_strips(f, CLOUD, (int)f->forest->cluster_count);
+    const int near_count = f->o.is_bare ? 0 : upload_near(f);
+    if (near_count) draw_strips(f, NEAR_CARD, near_count);
     glUseProgram(f->programs[LAND]); /* last, because most of it is hidden */
     glDrawArrays(GL_TRIANGLES, 0, 3);
     f->draws++;

@@ -88,6 +88,7 @@ int render_pictures(forest_gl *f) {
         char path[1024];
         if (i > 0 && !advance_wind(f, f->o.time + i / 25.0)) break;
         upload_bones(f);
+        if (i == 0) draw_shadows(f);
         draw_frame(f, target, width, height);
         glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, pixels);
         downsample(pixels, f->o.width, f->o.height, f->o.smooth, rgb);

@@ -4,13 +4,14 @@
    forest_gl [--species NAME|FILE,...] [--count N] [--seed N] [--pieces N] [--bare]
              [--bark DIR|SHEET.png] [--leaf PICTURE.png]
              [--time T] [--wind SPEED] [--level MAX] [--half METRES] [--wire]
-             [--orbit AZIMUTH,ELEVATION,DISTANCE] [--at X,Y,Z] [--size WxH] [--shaders DIR]
+             [--cards METRES] [--orbit AZIMUTH,ELEVATION,DISTANCE] [--at X,Y,Z] [--size WxH] [--shaders DIR]
              [--headless OUT.png [--frames N] [--smooth N]]
 
    How a game uses treepieces.h and shaders/treepieces.glsl. The arrays of the forest are uploaded once,
    the bones once a frame. A frame is one instanced draw call for each type of piece, one for all leaf
    clouds, one for ground and sky, and, if the view has turned, one that renders the impostors of the
-   clouds again: at most 10 for any number of trees.
+   clouds again: at most 10 for any number of trees, and one more where leaves are so near to the camera
+   that they are drawn as cards. What the sun sees is drawn once, as shadows.
 
    In the window: drag to turn, wheel to zoom, right button to move, w shows the levels of tessellation,
    l toggles the leaves, space pauses the wind, Esc quits. --headless needs neither a window nor a
@@ -19,6 +20,7 @@
    --bark    a set of framed tiles from 'texkit tiles --kind frame', or a sheet of treepieces_bark
    --leaf    a picture with transparency, for all species
    --level   the level of tessellation at the eye; --half: the distance over which it halves
+   --cards   leaves nearer than this are cards, those further away impostors, in between some of each
    --orbit   azimuth and elevation of the camera, and its distance from the middle of the forest or
              from --at
    --smooth  samples of a pixel, horizontally and vertically
@@ -61,7 +63,7 @@ int main(int argc, char **argv) {
         fprintf(stderr,
                 "usage: forest_gl [--species NAME|FILE,...] [--count N] [--seed N] [--pieces N]\n"
                 "  [--bare] [--bark DIR|SHEET.png] [--leaf PNG] [--time T] [--wind SPEED]\n"
-                "  [--level MAX] [--half METRES] [--wire] [--orbit AZIMUTH,ELEVATION,DISTANCE]\n"
+                "  [--level MAX] [--half METRES] [--wire] [--cards METRES] [--orbit AZIMUTH,ELEVATION,DISTANCE]\n"
                 "  [--at X,Y,Z] [--size WxH] [--shaders DIR]\n"
                 "  [--headless OUT.png [--frames N, with %%d in OUT] [--smooth N]]\n");
         return 2;

@@ -48,6 +48,7 @@ int read_option(options *o, const char *name, const char *value) {
         else if (strcmp(name, "--wind") == 0) o->wind = v[0];
         else if (strcmp(name, "--level") == 0) o->level = v[0];
         else if (strcmp(name, "--half") == 0) o->half = v[0];
+        else if (strcmp(name, "--cards") == 0) o->cards = v[0];
         else return 0;
     }
     return 2;
@@ -65,6 +66,7 @@ options default_options(void) {
     o.wind = 4;
     o.level = 6;
     o.half = 12;
+    o.cards = 7;
     o.orbit[1] = 5;
     return o;
 }
@@ -73,5 +75,6 @@ int options_are_valid(const options *o) {
     return o->count >= 1 && o->count <= 1000000 && o->frames >= 1 && o->frames <= 100000 &&
            o->width >= 16 && o->width <= 8192 && o->height >= 16 && o->height <= 8192 &&
            o->smooth >= 1 && o->smooth <= 4 && o->level >= 1 && o->level <= 64 && o->half > 0 &&
+           o->cards >= 0 &&
            (o->frames == 1 || !o->headless || strchr(o->headless, '%'));
 }

@@ -57,6 +57,7 @@ void run_window(forest_gl *f, const char *program) {
         before = now;
         if (!is_paused && !advance_wind(f, f->now + (step < 0.2 ? step : 0.2))) break;
         upload_bones(f);
+        if (!shown) draw_shadows(f);
         SDL_GL_GetDrawableSize(window, &width, &height);
         draw_frame(f, 0, width, height);
         SDL_GL_SwapWindow(window);

@@ -11,7 +11,7 @@ if [ ! "$gl" -nt tests/look/gl_treepieces.c ] || [ -n "$(find examples/forest_gl
     check "gl_treepieces builds" $CC -std=c99 -O2 -ffp-contract=off -Wall -Wextra -I. \
         tests/look/gl_treepieces.c build/files/stb.o -o "$gl" -lEGL -lOpenGL -lcjson -lm || exit 1
 fi
-"$gl" 2>&1 | sed '/^ok\|^not ok/!s/^/    # /'
+{ "$gl" || echo "not ok - gl_treepieces ended with status $?"; } 2>&1 | sed '/^ok\|^not ok/!s/^/    # /'
 
 check "forest_gl builds" make -s "${forest#"$PWD/"}" || exit 1
 cd "$tmp" || exit 1
