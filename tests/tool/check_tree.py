@@ -9,6 +9,8 @@
 #   forest   a GLB of copies: instanced nodes, their attributes
 #   variants a GLB of plain nodes: no extension, every mesh in use, each bark one surface, the nodes
 #            upright; expect=FILE: names, boxes and triangles of the nodes, for other programs to compare
+#   attributes  a GLB of --wind-attributes; skin=FILE is the same tree with its skeleton. The numbers
+#            for shaders fit the joints, and the shader of docs/trees.md tears nothing
 #   placed   FILE is what 'assimp export x.glb y.assjson' made of such nodes; expect=JSON as above
 #   obj      an OBJ: the bark is one surface, manifold, oriented, open at the root rim or nowhere
 #   assimp   FILE is what 'assimp export x.glb y.assjson' made; expect=JSON names what 'skin' wrote
@@ -393,6 +395,83 @@ def check_placed(path, want):
     return {}
 
 
+# ---- a tree for shaders
+
+def in_wind(p, weights, pivot, phase, wind, bend, flutter, time):
+    """The shader of docs/trees.md."""
+    angle = flutter * weights[1] * math.sin(2 * math.pi * (1.3 * time + phase))
+    arm = [a - b for a, b in zip(p, pivot)]
+    axis = (wind[2], 0, -wind[0])  # cross((0, 1, 0), wind)
+    across = (axis[1] * arm[2] - axis[2] * arm[1], axis[2] * arm[0] - axis[0] * arm[2],
+              axis[0] * arm[1] - axis[1] * arm[0])
+    along = sum(a * b for a, b in zip(axis, arm)) * (1 - math.cos(angle))
+    gust = bend * weights[0] * weights[0] * (1 + 0.4 * math.sin(2 * math.pi * 0.3 * time))
+    return tuple(pivot[k] + arm[k] * math.cos(angle) + across[k] * math.sin(angle) + axis[k] * along +
+                 gust * wind[k] for k in range(3))
+
+
+def check_attributes(path, want):
+    glb, tree = Glb(path), Tree(want.pop("skin"))
+    g = glb.json
+    need(not {"extensionsUsed", "skins", "animations"} & set(g) and len(g["nodes"]) == 1, "more than a mesh")
+    rest = {}  # of the joints: where they are, which is the first of their branch
+    for j in tree.joints:  # parents first
+        n, p = tree.nodes[j], tree.parent.get(j)
+        m = matrix(n["translation"], n["rotation"])
+        rest[j] = product(rest[p][0], m) if p is not None else m, j
+        if n["name"].startswith("trunk"):
+            rest[j] = rest[j][0], tree.joints[0]
+        elif not tree.nodes[p]["name"].startswith("trunk"):
+            rest[j] = rest[j][0], rest[p][1]
+    place = {j: tuple(row[3] for row in rest[j][0]) for j in rest}
+    size = max(max(p) for p in place.values())
+    weights, phases, triangles, highest, feet = {}, {}, 0, [0, 0], 0
+    for p, q in zip(g["meshes"][0]["primitives"], tree.primitives):
+        a, b = p["attributes"], q["attributes"]
+        need({"TEXCOORD_1", "TEXCOORD_2", "TEXCOORD_3"} <= set(a) and "JOINTS_0" not in a, "attributes")
+        glb.primitive(p)
+        positions, joints, shares = (tree.values(b[n]) for n in ("POSITION", "JOINTS_0", "WEIGHTS_0"))
+        need(glb.values(a["POSITION"]) == positions, "another tree than with a skeleton")
+        numbers = list(zip(*(glb.values(a["TEXCOORD_%d" % k]) for k in (1, 2, 3))))
+        moved = [[], []]
+        for x, j, w, ((sway, flutter), (px, py), (pz, phase)) in zip(positions, joints, shares, numbers):
+            need(0 <= sway <= 1 and 0 <= flutter <= 1 and 0 <= phase < 1, "a number beyond 0..1")
+            if x[1] < 1e-6 and p is g["meshes"][0]["primitives"][0] and j[w.index(max(w))] == 0:
+                need(sway == 0 and flutter == 0, "the foot moves")
+                feet += 1
+            highest = [max(highest[0], sway), max(highest[1], flutter)]
+            joint = tree.joints[j[w.index(max(w))]]
+            if max(w) == 1:  # all that one joint moves alone moves alike
+                base = rest[joint][1]
+                need(distance((px, py, pz), place[base]) < 1e-5 * size, "a pivot that is not the branch's joint")
+                known = weights.setdefault(joint, (sway, flutter))
+                need(distance(known, (sway, flutter)) < 1e-6, "weights of a joint differ")
+                need(phases.setdefault(base, phase) == phase, "two phases of a branch")
+            for k in range(2):
+                moved[k].append(in_wind(x, (sway, flutter), (px, py, pz), phase, (0.8, 0, 0.6),
+                                        0.07 * size, 0.12, 0.2 + k))
+        indices = [i for i, in glb.values(p["indices"])]
+        for t in range(0, len(indices), 3):
+            for k in range(3):
+                c, d = indices[t + k], indices[t + (k + 1) % 3]
+                was = distance(positions[c], positions[d])
+                for m in moved:
+                    need(abs(distance(m[c], m[d]) - was) < 0.3 * was + 1e-3 * size, "the shader tears the tree")
+        triangles += len(indices) // 3
+        need(max(distance(x, y) for x, y in zip(positions, moved[0])) > 0.03 * size, "the shader moves nothing")
+    for j, (sway, flutter) in weights.items():
+        p = tree.parent.get(j)
+        trunk = tree.nodes[j]["name"].startswith("trunk")
+        need(not trunk or flutter == 0, "the trunk flutters")
+        if p in weights:
+            need(sway > weights[p][0], "sway does not grow along an axis")
+            need(trunk or rest[j][1] == j or flutter > weights[p][1], "flutter does not grow along a branch")
+            need(trunk or rest[j][1] != j or flutter == 0, "a branch does not begin with 0")
+    need(len(weights) > 0.9 * len(tree.joints), "joints that move no vertex alone")
+    need(min(highest) > 0.999 and feet >= 6, "no weight is 1, or none at the foot")
+    return {"triangles": triangles, "phases": len(phases), "materials": len(g["materials"])}
+
+
 # ---- OBJ
 
 def check_obj(path, want):
@@ -477,7 +556,7 @@ def main():
     need(len(sys.argv) > 2, "KIND FILE [NAME=VALUE...]")
     want = dict(a.split("=", 1) for a in sys.argv[3:])
     kinds = {"skin": check_skin, "forest": check_forest, "obj": check_obj, "assimp": check_assimp,
-             "variants": check_variants, "placed": check_placed}
+             "variants": check_variants, "placed": check_placed, "attributes": check_attributes}
     figures = kinds[sys.argv[1]](sys.argv[2], want)
     for name, value in figures.items():
         print("%s=%s" % (name, value))

@@ -174,6 +174,31 @@ refuses 2 "--variants goes with" $small_forest -o n.obj --variants 2
 refuses 2 "at least 2" $small_forest -o n.glb --variants 1 --species oak,birch
 refuses 2 "--variants" $small_forest -o n.glb --variants 0
 
+# ---- wind for shaders
+for name in oak spruce dead; do
+    check "$name with numbers for a shader" run 0 tree -o wind.glb --wind-attributes --species $name \
+        --pieces 150 --sheet 128
+    check "and with a skeleton" run 0 tree -o skin.glb --species $name --pieces 150 --sheet 128
+    check "stand and move alike" $check_tree attributes wind.glb skin=skin.glb
+    cp wind.glb "$glbs/wind-$name.glb" && echo '{"joints": 0}' >"$glbs/wind-$name.json"
+done
+check "variants with numbers for a shader" run 0 $small_forest -o windy.glb --variants 2 --wind-attributes \
+    --seed 7 --species dead
+check "are plain nodes too" $check_tree variants windy.glb nodes=14 variants=2
+check "the same tree alone" run 0 tree -o wind.glb --wind-attributes --species dead --pieces 60 --sheet 128 --seed 7
+check "has the same numbers" /usr/bin/python3 -c "
+import sys
+sys.path.insert(0, '$root/tests/tool')
+from check_glb import Glb
+a, b = Glb('wind.glb'), Glb('windy.glb')
+for k in range(1, 4):
+    p, q = (g.json['meshes'][0]['primitives'][0]['attributes']['TEXCOORD_%d' % k] for g in (a, b))
+    assert a.values(p) == b.values(q)"
+refuses 2 "--wind-attributes goes with" tree -o n.obj --wind-attributes
+refuses 2 "--wind-attributes goes with --variants" $small_forest -o n.glb --wind-attributes
+refuses 2 "does not go with --bones or --wind" tree -o n.glb --wind-attributes --wind 3
+refuses 2 "does not go with --bones or --wind" tree -o n.glb --wind-attributes --bones 3
+
 # ---- as other programs read them
 programs=$tmp/programs
 mkdir -p "$programs/home" && cp "$glbs"/variants.* "$glbs"/posed.* "$glbs"/willow.* "$programs/"

@@ -185,9 +185,12 @@ static int build_baked(tree_job *j, built *b) {
         const int to_wood = is_bare || tree_has_one_bark(j) ? 0 : species;
         status = bake_tree(j, t, j->posed, &bark, &leaves);
         if (!status) status = append(j, bark, is_bare ? s->bark_color : NULL, &b->wood[to_wood]);
+        if (!status && j->wind_attributes) status = tree_add_pivots(j, t, bark, &b->wood[to_wood]);
         if (!status && leaves)
             status = append(j, leaves, is_bare ? s->leaf_color : NULL,
                             is_bare ? &b->wood[0] : &b->foliage[species]);
+        if (!status && leaves && j->wind_attributes)
+            status = tree_add_pivots(j, t, leaves, &b->foliage[species]);
         treepieces_mesh_free(bark);
         treepieces_mesh_free(leaves);
     }
@@ -240,6 +243,9 @@ static int build_variant(tree_job *j, int k, built *b) {
     int status = bake_tree(j, k, j->posed, &bark, &leaves);
     if (!status) status = append(j, bark, NULL, &b->variants[2 * k]);
     if (!status && leaves) status = append(j, leaves, NULL, &b->variants[2 * k + 1]);
+    if (!status && j->wind_attributes) status = tree_add_pivots(j, k, bark, &b->variants[2 * k]);
+    if (!status && j->wind_attributes && leaves)
+        status = tree_add_pivots(j, k, leaves, &b->variants[2 * k + 1]);
     snprintf(b->names[k], sizeof b->names[k], "%s-%d", j->species[species].name, k + 1);
     o->name = b->names[k];
     o->parts = b->variant_parts[k];
@@ -373,8 +379,8 @@ static int grow_trees(tree_job *j, built *b) {
     status = tree_dress(j, tint);
     if (status) return status;
     cli_stage(&j->run, "build");
-    if (!tree_is_glb(j)) status = build_baked(j, b);
-    else if (j->variants) status = build_variants(j, b);
+    if (j->variants) status = build_variants(j, b);
+    else if (!tree_is_glb(j) || j->wind_attributes) status = build_baked(j, b);
     else status = j->is_forest ? build_copies(j, tint, b) : build_rigged(j, b);
     if (!status) status = make_extras(j, b);
     if (status) return status;
@@ -422,6 +428,9 @@ static int run_job(tree_job *j, int needs_glb) {
         return cli_fail(&j->run, CLI_USAGE, "--bones, --seconds and --rate go with an OUT in .glb");
     if (j->variants && !tree_is_glb(j))
         return cli_fail(&j->run, CLI_USAGE, "--variants goes with an OUT in .glb");
+    if (j->wind_attributes && (!tree_is_glb(j) || (j->is_forest && !j->variants)))
+        return cli_fail(&j->run, CLI_USAGE, "--wind-attributes goes with %san OUT in .glb",
+                        j->is_forest ? "--variants and " : "");
     if (j->level > 1 && j->is_forest && tree_is_glb(j) && !j->variants)
         return cli_fail(&j->run, CLI_USAGE,
                         "--level does not go with a forest in .glb; add --variants K");
@@ -463,6 +472,9 @@ static int run_tree(int argc, char **argv) {
         {CLI_TEXT, "--wind", "SPEED", "metres per second, up to 50; default 0", &wind, 0, 0},
         {CLI_TEXT, "--seconds", "S", "length of the animation, 1 to 60; default 4", &seconds, 0, 0},
         {CLI_INT, "--rate", "FPS", "keys per second, 1 to 60; default 12", &j->rate, 1, 60},
+        {CLI_FLAG, "--wind-attributes", NULL,
+         ".glb: no skeleton; numbers at the vertices that let a shader move them", &j->wind_attributes,
+         0, 0},
         {CLI_TEXT, "--pose", "AMOUNT",
          "bend the joints at random, by at most this many radians, 0 to 1", &bend, 0, 0},
         {CLI_INT, "--bones", "N", "maximum number of joints; default: one per piece", &j->bones, 1,
@@ -476,6 +488,9 @@ static int run_tree(int argc, char **argv) {
         status = parse_number(&j->run, "--wind", wind, 0, 50, &j->wind);
         if (!status) status = parse_number(&j->run, "--seconds", seconds, 1, 60, &j->seconds);
         if (!status) status = parse_number(&j->run, "--pose", bend, 0, 1, &j->pose);
+        if (!status && j->wind_attributes && (j->bones || j->wind > 0))
+            status = cli_fail(&j->run, CLI_USAGE,
+                              "--wind-attributes leaves out the skeleton; it does not go with --bones or --wind");
         if (!status && needs_wind && j->wind <= 0)
             status = cli_fail(&j->run, CLI_USAGE, "--seconds and --rate go with --wind SPEED");
         if (!status) status = run_job(j, needs_glb);
@@ -508,6 +523,8 @@ static int run_forest(int argc, char **argv) {
          &j->level, 1, MAX_LEVEL},
         {CLI_FLAG, "--capped", NULL, ".obj, .ply, variants: close the feet of the trunks as well", &j->capped,
          0, 0},
+        {CLI_FLAG, "--wind-attributes", NULL,
+         "variants: numbers at the vertices that let a shader move them", &j->wind_attributes, 0, 0},
         {CLI_TEXT, "--wind", "SPEED",
          "bend as in wind of this speed, metres per second, up to 50; default 0", &wind, 0, 0},
         {CLI_TEXT, "--pose", "AMOUNT", "bend the joints at random, by at most this many radians, 0 to 1",

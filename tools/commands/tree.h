@@ -2,9 +2,10 @@
    SPDX-License-Identifier: MIT OR Unlicense
 
    tree_job.c reads the species, grows and poses. Above it are tree_looks.c, the pictures of bark
-   and leaves; tree_rig.c, the skeleton and its animation; tree_copies.c, the instances of a forest;
-   and tree_variants.c, where its trees stand if they are a few different ones. At the top tree.c
-   bakes, writes and holds the commands. Calls only run downward.                                */
+   and leaves; tree_rig.c, the skeleton and its animation; tree_pivots.c, what moves a tree without
+   one; tree_copies.c, the instances of a forest; and tree_variants.c, where its trees stand if they
+   are a few different ones. At the top tree.c bakes, writes and holds the commands. Calls only run
+   downward.                                                                                     */
 #ifndef TREE_H
 #define TREE_H
 
@@ -35,7 +36,7 @@ typedef struct tree_job {
 
     /* options */
     const char *species_list, *tiles, *leaf;
-    int count, pieces, bare, level, capped, bones, rate, sheet, variants;
+    int count, pieces, bare, level, capped, bones, rate, sheet, variants, wind_attributes;
     int is_forest;
     double wind, seconds, pose, spacing;
 
@@ -106,6 +107,13 @@ void tree_free_rig(tree_rig *rig);
 
 /* Joints and weights of a baked mesh, with the joint numbers of the rig. */
 int tree_bind_mesh(tree_job *j, const tree_rig *rig, const treepieces_mesh *from, mesh_data *to);
+
+/* ---- tree_pivots.c ---- */
+
+/* Give the last from->vertex_count vertices of a mesh, those of a tree's bark or leaves, the numbers
+   for a shader's wind: how far they go with the tree, and with their branch, 0..1 each; the place that
+   the branch turns about; its phase, 0..1. */
+int tree_add_pivots(tree_job *j, int tree, const treepieces_mesh *from, mesh_data *to);
 
 /* ---- tree_copies.c ---- */
 

@@ -125,7 +125,7 @@ static int pose(tree_job *j) {
     const treepieces_pose bent = {j->run.seed, (float)j->pose, NULL};
     const size_t nodes = j->forest->node_count;
     const treepieces_wind wind = tree_wind(j);
-    const int has_rig = tree_is_glb(j) && !j->is_forest;
+    const int has_rig = tree_is_glb(j) && !j->is_forest && !j->wind_attributes;
     txm_status result = TXM_OK;
     j->posed = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
     if (has_rig) j->rest = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));

@@ -95,6 +95,7 @@ void mesh_free(mesh_data *mesh) {
     free(mesh->corner_normals);
     free(mesh->joints);
     free(mesh->weights);
+    free(mesh->wind);
     memset(mesh, 0, offsetof(mesh_data, message));
 }
 

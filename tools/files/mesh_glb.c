@@ -203,6 +203,13 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
         sink_print(s, ",\"TEXCOORD_0\":%d",
                    glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
     }
+    for (size_t set = 0; set < MESH_WIND / 2 && m->wind; set++) {
+        start = bin->bytes.count;
+        for (size_t i = 0; i < f.count; i++)
+            sink_floats(bin, m->wind + MESH_WIND * flat_vertex(&f, i) + 2 * set, 2);
+        sink_print(s, ",\"TEXCOORD_%d\":%d", (int)set + 1,
+                   glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
+    }
     if (m->colors || m->face_colors) {
         start = bin->bytes.count;
         for (size_t i = 0; i < f.count; i++) put_color(bin, flat_color(&f, i));

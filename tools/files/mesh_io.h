@@ -38,6 +38,8 @@ static inline float mesh_place_in(const mesh_place *place, double value, int axi
     return (float)((value - place->origin[axis]) / mesh_place_scale(place));
 }
 
+enum { MESH_WIND = 6 }; /* numbers of a vertex for a shader that moves it */
+
 /* A triangle mesh, or a list of points. Readers fill in all fields; mesh_free releases it. */
 typedef struct mesh_data {
     size_t vertex_count, triangle_count; /* no triangles: a list of points                    */
@@ -55,6 +57,8 @@ typedef struct mesh_data {
     float *corner_normals;               /* 3 per corner, or NULL; mesh_crease makes them     */
     uint32_t *joints;                    /* 4 per vertex, into a mesh_skeleton, or NULL; only */
     float *weights;                      /* 4 per vertex, sum 1           GLB files hold them */
+    float *wind;                         /* MESH_WIND per vertex, or NULL; GLB writes them as
+                                            TEXCOORD_1 to TEXCOORD_3                          */
     mesh_place place;                    /* of the positions                                  */
     char message[120];
     char note[200]; /* of what a reader has left out or taken another way, in one line, or "" */
