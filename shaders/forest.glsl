@@ -69,7 +69,8 @@ float sun_at(vec3 place, float bias, float least, float most) {
     vec3 at = (frame.sun_projection * vec4(place, 1.0)).xyz * 0.5 + 0.5;
     mat3 rows = transpose(mat3(frame.sun_projection)) * 0.5; /* pictures per metre */
     vec2 size = vec2(length(rows[0]), length(rows[1]));
-    float deep = length(rows[2]), turn = 6.283 * hash(gl_FragCoord.xy), above = 0.0, count = 0.0;
+    float deep = length(rows[2]), above = 0.0, count = 0.0;
+    float turn = 6.283 * fract(52.983 * fract(dot(gl_FragCoord.xy, vec2(0.06711, 0.00584))));
     if (any(greaterThan(abs(at.xy - 0.5), vec2(0.5)))) return 1.0;
     at.z -= bias * deep;
     for (float k = 0.0; k < 6.0; k++) {
@@ -82,11 +83,11 @@ float sun_at(vec3 place, float bias, float least, float most) {
     }
     if (count == 0.0) return 1.0;
     float soft = clamp(0.025 * above / (count * deep), least, most), lit = 0.0;
-    for (float k = 0.0; k < 10.0; k++) {
-        float angle = turn + 2.4 * k, far = soft * sqrt((k + 0.5) / 10.0);
+    for (float k = 0.0; k < 12.0; k++) {
+        float angle = turn + 2.4 * k, far = soft * sqrt((k + 0.5) / 12.0);
         lit += float(textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r >= min(at.z, 1.0));
     }
-    return lit / 10.0;
+    return lit / 12.0;
 }
 #endif
 
@@ -258,12 +259,12 @@ vec4 aged(vec3 at, float radius, int kind, float pale) {
     float height = 0.0;
     float thick = smoothstep(0.03, 0.09, radius); /* thin ones move in the wind, through the noise */
     if (kind == 0 || kind == 3) {
-        vec2 size = clamp(radius, 0.03, 0.4) * (kind == 0 ? vec2(0.22, 1.1) : vec2(0.5, 0.75));
+        vec2 size = clamp(radius, 0.03, 0.4) * (kind == 0 ? vec2(0.22, 1.1) : vec2(0.32, 0.7));
         float one = abs(noise(far.xy / size + 2.0 * blotch) - 0.5);
         float two = abs(noise(far.zy / size + 2.0 * blotch + 17.0) - 0.5);
-        float furrow = thick * (1.0 - smoothstep(0.0, kind == 0 ? 0.16 : 0.10, min(one, two)));
+        float furrow = thick * (1.0 - smoothstep(0.0, kind == 0 ? 0.16 : 0.09, min(one, two)));
         height = -furrow;
-        color *= 1.0 - 0.55 * furrow;
+        color *= 1.0 - (kind == 0 ? 0.55 : 0.4) * furrow;
         /* the plates of old pines are grey */
         if (kind == 3) color = mix(color, color * vec3(0.62, 0.80, 1.0), smoothstep(0.10, 0.2, radius));
     } else if (kind == 2) {
@@ -419,7 +420,9 @@ vec3 leaf_light(vec3 place, vec3 n) {
     /* a leaf lit from behind is brighter and yellower than one that reflects */
     float through = clamp(0.2 + 0.8 * dot(normalize(place - frame.eye.xyz), frame.sun.xyz), 0.0, 1.0);
     return sun_color * sun * (0.85 * facing + 0.9 * through * vec3(1.0, 1.0, 0.25)) +
-           sky_color * mix(0.3, 1.0, skywards) * open.g * open.g * 1.3 +
+           sky_color * mix(0.35, 1.0, skywards) * (0.08 + 0.92 * open.g) * open.g * 1.3 +
+           /* light that other leaves let through or scatter */
+           (0.25 + sun_color * 0.16 * open.r) * (0.4 + 0.6 * open.g) * vec3(0.75, 1.0, 0.4) +
            land_color * 0.5 * (1.0 - skywards) * open.r;
 }
 #endif
@@ -519,7 +522,10 @@ out vec4 color;
 
 void main() {
     vec4 texel = texture(leaves, vec3(leaf, species));
-    if (texel.a < 0.5 || !shows_cards(center)) discard;
+    /* cards seen edge on would be streaks */
+    vec3 face = normalize(cross(dFdx(place), dFdy(place)));
+    float turned = abs(dot(face, normalize(place - frame.eye.xyz)));
+    if (texel.a < 0.5 || turned < 0.3 * hash(gl_FragCoord.yx) || !shows_cards(center)) discard;
     vec3 albedo = pow(texel.rgb * own_light, vec3(2.2)) * tint;
     color = seen(albedo * leaf_light(place, normalize(normal)), place);
 }

@@ -35,7 +35,7 @@ void aim_camera(forest_gl *f, int width, int height) {
     d->right[3] = tan_right;
     d->up[3] = tan_up;
     d->forward[3] = CLOUDS;
-    d->box_scale[3] = 0.1f / (distance + wide + 30);
+    d->box_scale[3] = 0.13f / (distance + wide + 30);
     d->lod[0] = f->o.level;
     d->lod[1] = f->o.half;
     d->lod[2] = 0.6f;
