@@ -13,11 +13,13 @@ def need(truth, *what):
 
 
 class Png:
-    """A PNG of 8 or 16 bits that is not interlaced; lines are the bytes of its rows."""
+    """A PNG of 8 or 16 bits that is not interlaced, of a path or in bytes; lines are the bytes of its
+    rows."""
 
-    def __init__(self, path):
-        with open(path, "rb") as file:
-            data = file.read()
+    def __init__(self, path, data=None):
+        if data is None:
+            with open(path, "rb") as file:
+                data = file.read()
         need(data[:8] == b"\x89PNG\r\n\x1a\n", path, "is not PNG")
         self.width, self.height, self.bits, colour, _, _, interlace = struct.unpack(
             ">IIBBBBB", data[16:29])

@@ -11,6 +11,7 @@
 #            upright; expect=FILE: names, boxes and triangles of the nodes, for other programs to compare
 #   attributes  a GLB of --wind-attributes; skin=FILE is the same tree with its skeleton. The numbers
 #            for shaders fit the joints, and the shader of docs/trees.md tears nothing
+#   relief   a GLB whose bark has a normal map: does it fit the bark?
 #   placed   FILE is what 'assimp export x.glb y.assjson' made of such nodes; expect=JSON as above
 #   obj      an OBJ: the bark is one surface, manifold, oriented, open at the root rim or nowhere
 #   assimp   FILE is what 'assimp export x.glb y.assjson' made; expect=JSON names what 'skin' wrote
@@ -23,7 +24,9 @@ import os
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../kit"))
 from check_glb import Glb, need  # noqa: E402
+from png import Png  # noqa: E402
 
 SAMPLES = 60  # vertices of a primitive that other programs compare
 
@@ -281,6 +284,41 @@ def check_skin(path, want):
     return {"joints": len(tree.joints), "keys": len(tree.times), "seconds": expect["seconds"],
             "pieces": extras["pieces"], "materials": len(materials),
             "images": len(g.get("images", []))}
+
+
+# ---- the normal map of the bark
+
+def picture(glb, texture):
+    g = glb.json
+    view = g["bufferViews"][g["images"][g["textures"][texture["index"]]["source"]]["bufferView"]]
+    start = view.get("byteOffset", 0)
+    return Png("a picture", glb.bin[start:start + view["byteLength"]])
+
+
+def check_relief(path, _):
+    """Half the size of the bark, of unit vectors, leaning to where the bark gets darker."""
+    glb = Glb(path)
+    material = glb.json["materials"][0]
+    bark, relief = picture(glb, material["pbrMetallicRoughness"]["baseColorTexture"]), \
+        picture(glb, material["normalTexture"])
+    need((2 * relief.width, 2 * relief.height) == (bark.width, bark.height), "size of the normal map")
+    need(glb.json["textures"][material["normalTexture"]["index"]]["sampler"] == 0, "its sampler")
+
+    def light(x, y):
+        return sum(sum(bark.lines[2 * y + v][bark.channels * (2 * x + u):][:3])
+                   for u in (0, 1) for v in (0, 1))
+    agree = lean = 0
+    for y in range(1, relief.width - 1): # of the first layer
+        for x in range(1, relief.width - 1):
+            n = [c / 127.5 - 1 for c in relief.lines[y][3 * x:3 * x + 3]]
+            need(abs(math.hypot(*n) - 1) < 0.02 and n[2] > 0.2, "a normal of the bark")
+            for k, step in ((0, light(x - 1, y) - light(x + 1, y)), (1, light(x, y + 1) - light(x, y - 1))):
+                if abs(step) < 60: # of 12 times 255
+                    continue
+                lean += 1
+                agree += step * n[k] > 0
+    need(lean > 500 and agree == lean, "%d of %d normals lean as the bark does" % (agree, lean))
+    return {"reliefs": lean}
 
 
 # ---- a forest of copies
@@ -556,7 +594,8 @@ def main():
     need(len(sys.argv) > 2, "KIND FILE [NAME=VALUE...]")
     want = dict(a.split("=", 1) for a in sys.argv[3:])
     kinds = {"skin": check_skin, "forest": check_forest, "obj": check_obj, "assimp": check_assimp,
-             "variants": check_variants, "placed": check_placed, "attributes": check_attributes}
+             "variants": check_variants, "placed": check_placed, "attributes": check_attributes,
+             "relief": check_relief}
     figures = kinds[sys.argv[1]](sys.argv[2], want)
     for name, value in figures.items():
         print("%s=%s" % (name, value))

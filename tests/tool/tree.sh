@@ -69,7 +69,8 @@ check "--pose" run 0 $small -o posed.glb --pose 0.2 --wind 3.5 --seconds 1.5 --r
 check "bends the joints" $check_tree skin posed.glb posed=1 keys=16 seconds=1.5 expect=posed.json
 keep posed.glb posed.json
 check "--bare" run 0 $small -o bare.glb --bare --wind 20 --seconds 1 --rate 3
-check "has one material" $check_tree skin bare.glb materials=1 images=1 expect=bare.json
+check "has one material" $check_tree skin bare.glb materials=1 images=2 expect=bare.json
+check "and a normal map of its bark" $check_tree relief bare.glb
 keep bare.glb bare.json
 check "--level and --capped" run 0 $small -o level.glb --level 2 --capped --bare --stats stats.json
 check "divide the quads and close the foot" $check_tree skin level.glb rims=0
@@ -113,7 +114,7 @@ check "is without its leaves" $check_tree skin mine.glb materials=1
 "$draw" cells leaf.png 64 4
 check "tiles of bark" run 0 tiles bark.png -o bark --kind frame --size 48 --colors 1 --variants 4
 check "--tiles and --leaf" run 0 $tree -o dressed.glb --tiles bark --leaf leaf.png
-check "are in the file" $check_tree skin dressed.glb images=2 expect=dressed.json
+check "are in the file" $check_tree skin dressed.glb images=3 expect=dressed.json
 keep dressed.glb dressed.json
 check "--sheet" run 0 $tree -o small.obj --tiles bark --sheet 128
 # a PNG's width and height
@@ -134,7 +135,7 @@ check "of three species" run 0 forest --count 30 -o three.glb --species oak,birc
 check "is copies in ten nodes too" $check_tree forest three.glb most_nodes=10 trees=30 expect=three.json
 keep three.glb three.json
 check "with tiles" run 0 forest --count 5 -o laid.glb --tiles bark --pieces 40 --bare
-check "and without leaves" $check_tree forest laid.glb clouds=0 images=1
+check "and without leaves" $check_tree forest laid.glb clouds=0 images=2
 check "baked" run 0 forest --count 3 -o grove.obj --species oak,birch --pieces 120 --spacing 8
 check "is a tree each" $check_tree obj grove.obj components=3 rims=3
 check "as PLY" run 0 forest --count 3 -o grove.ply --species oak,birch --pieces 50
@@ -147,7 +148,7 @@ rm -f ./*.glb ./*.obj ./*.ply
 # ---- forests of plain nodes
 small_forest="forest --count 14 --pieces 60 --sheet 128"
 check "--variants" run 0 $small_forest -o v.glb --species oak,birch --variants 4 --stats stats.json
-check "are plain nodes of meshes" $check_tree variants v.glb nodes=14 variants=4 materials=4 images=4 \
+check "are plain nodes of meshes" $check_tree variants v.glb nodes=14 variants=4 materials=4 images=6 \
     expect=variants.json triangles="$(figure triangles)" pieces="$(figure pieces)"
 check "tells how many" grep -q '^v.glb: 14 trees, 4 different ones, ' out.log
 keep v.glb variants.json

@@ -50,6 +50,7 @@ typedef struct tree_job {
 
     /* one bark of all species, or one of each */
     picture bark[MAX_SPECIES], leaves[MAX_SPECIES]; /* png NULL: none */
+    picture relief[MAX_SPECIES];                    /* normal map of the bark, only in GLB */
     mesh_material bark_materials[MAX_SPECIES], leaf_materials[MAX_SPECIES];
 } tree_job;
 

@@ -26,6 +26,7 @@ tree_job *new_tree_job(int is_forest) {
 void free_tree_job(tree_job *j) {
     for (int s = 0; s < MAX_SPECIES; s++) {
         free(j->bark[s].png);
+        free(j->relief[s].png);
         free(j->leaves[s].png);
     }
     free(j->rest);

@@ -4,6 +4,7 @@
 #include "files/image_io.h"
 
 #include <cjson/cJSON.h>
+#include <math.h>
 #include <stdio.h>
 
 enum { DRAWN_LEAVES = 256, MAX_TILES = 64 };
@@ -137,6 +138,46 @@ static int draw_tiles(tree_job *j, const treepieces_species *species, int side, 
         species->name);
 }
 
+/* ---- the sheet's normal map ------------------------------------------------------------------ */
+
+/* How high the bark is in 2 x 2 texels of a sheet, 0..1: as bright as it is. The columns repeat, a layer
+   ends at its first and last row. */
+static double height_at(const txm_image *sheet, int x, int y, int layer) {
+    const int size = sheet->width, half = size / 2, row = txm_clampi(y, layer * half, (layer + 1) * half - 1);
+    const int column = (x + half) % half;
+    double sum = 0;
+    for (int k = 0; k < 4; k++) {
+        const unsigned char *row_of = (const unsigned char *)txm_image_row_const(sheet, 2 * row + k / 2);
+        const unsigned char *texel = row_of + (2 * column + k % 2) * sheet->channels;
+        for (int c = 0; c < txm_image_colours(sheet); c++)
+            sum += texel[c] / (4 * 255.0 * txm_image_colours(sheet));
+    }
+    return sum;
+}
+
+/* Half as wide and high as the sheet; x to the right, y up in the picture, as glTF has it. */
+static int make_relief(tree_job *j, int s, const txm_image *sheet) {
+    const int width = sheet->width / 2, height = sheet->height / 2;
+    const double depth = 0.12 * width / TREEPIECES_SHEET; /* ours: of a tile, in texels */
+    txm_image out = {0};
+    int status = new_picture(&j->run, width, height, 3, TXM_U8, &out);
+    for (int y = 0; y < height && !status; y++) {
+        unsigned char *to = (unsigned char *)txm_image_row(&out, y);
+        for (int x = 0; x < width; x++) {
+            const int layer = y / width;
+            double n[3], length = 1;
+            n[0] = 0.5 * depth * (height_at(sheet, x - 1, y, layer) - height_at(sheet, x + 1, y, layer));
+            n[1] = 0.5 * depth * (height_at(sheet, x, y + 1, layer) - height_at(sheet, x, y - 1, layer));
+            n[2] = 1;
+            length = sqrt(n[0] * n[0] + n[1] * n[1] + 1);
+            for (int c = 0; c < 3; c++) *to++ = (unsigned char)(127.5 + 127.5 * n[c] / length + 0.5);
+        }
+    }
+    if (!status) status = encode(j, &out, "relief", s, &j->relief[s]);
+    free(out.pixels);
+    return status;
+}
+
 /* ---- the sheet ----------------------------------------------------------------------------- */
 
 static int make_bark(tree_job *j, int s, const float color[3]) {
@@ -162,6 +203,7 @@ static int make_bark(tree_job *j, int s, const float color[3]) {
         status = check_result(&j->run, treepieces_bark(&desc, &j->run.env, sheet),
                               j->tiles ? j->tiles : species.name);
     if (!status) status = encode(j, &sheet, "bark", s, &j->bark[s]);
+    if (!status && tree_is_glb(j)) status = make_relief(j, s, &sheet);
     free(block);
     free(sheet.pixels);
     return status;
@@ -225,6 +267,8 @@ int tree_dress(tree_job *j, float tint[3]) {
             status = make_bark(j, s, tree_has_one_bark(j) ? tint : j->species[s].bark_color);
         if (!status) status = make_leaves(j, s);
         set_material(j, &j->bark[s], 0, &j->bark_materials[s]);
+        j->bark_materials[s].relief = j->relief[s].png;
+        j->bark_materials[s].relief_size = j->relief[s].size;
         set_material(j, &j->leaves[s], 1, &j->leaf_materials[s]);
     }
     return status;

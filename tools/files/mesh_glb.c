@@ -429,11 +429,15 @@ static int has_picture(const glb *g, int i, int *first) {
     return 1;
 }
 
+static void print_png(glb *g, const unsigned char *png, size_t size, sink *json) {
+    const size_t start = g->binary.bytes.count;
+    put_png(&g->binary, png, size);
+    sink_print(json, "{\"bufferView\":%d,\"mimeType\":\"image/png\"}", glb_view(g, start, 0));
+}
+
 static void print_picture(glb *g, const mesh_material *m, sink *json) {
     if (m->png) {
-        const size_t start = g->binary.bytes.count;
-        put_png(&g->binary, m->png, m->png_size);
-        sink_print(json, "{\"bufferView\":%d,\"mimeType\":\"image/png\"}", glb_view(g, start, 0));
+        print_png(g, m->png, m->png_size, json);
     } else {
         sink_print(json, "{\"uri\":\"");
         print_uri(json, m->texture);
@@ -441,14 +445,71 @@ static void print_picture(glb *g, const mesh_material *m, sink *json) {
     }
 }
 
-static void print_materials(glb *g, sink *json) {
+/* Is number i the first of the materials with its picture? */
+static int owns_picture(const glb *g, int i) {
+    int first = -1;
+    return has_picture(g, i, &first) && first == i;
+}
+
+static int has_relief(const glb *g, int i) {
+    return owns_picture(g, i) && g->materials[i].material->relief;
+}
+
+/* The pictures, then the normal maps, of those materials that own them. */
+static void print_textures(glb *g, sink *json) {
     enum { CLAMP = 33071, REPEAT = 10497 };
-    int number[MAX_MATERIALS], textures = 0, first = 0; /* number: of a material's picture */
+    int written = 0, samplers = 0;
+    sink_print(json, ",\"textures\":[");
+    for (int i = 0; i < g->material_count; i++)
+        if (owns_picture(g, i)) {
+            sink_print(json, "%s{\"sampler\":%d,\"source\":%d}", written ? "," : "", written, written);
+            written++;
+        }
+    for (int i = 0; i < g->material_count; i++) {
+        if (has_relief(g, i)) {
+            sink_print(json, ",{\"sampler\":%d,\"source\":%d}", samplers, written);
+            written++;
+        }
+        samplers += owns_picture(g, i);
+    }
+    sink_print(json, "],\"samplers\":[");
+    samplers = 0;
+    for (int i = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i].material;
+        if (!owns_picture(g, i)) continue;
+        sink_print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":%d}",
+                   samplers++ ? "," : "", m->repeats ? REPEAT : CLAMP, m->repeats_down ? REPEAT : CLAMP);
+    }
+    sink_print(json, "],\"images\":[");
+    written = 0;
+    for (int i = 0; i < g->material_count; i++) {
+        if (!owns_picture(g, i)) continue;
+        if (written++) sink_print(json, ",");
+        print_picture(g, g->materials[i].material, json);
+    }
+    for (int i = 0; i < g->material_count; i++) {
+        const mesh_material *m = g->materials[i].material;
+        if (!has_relief(g, i)) continue;
+        sink_print(json, ",");
+        print_png(g, m->relief, m->relief_size, json);
+    }
+    sink_print(json, "]");
+}
+
+static void print_materials(glb *g, sink *json) {
+    int number[MAX_MATERIALS], relief[MAX_MATERIALS], textures = 0, first = 0; /* of its textures */
+    for (int i = 0; i < g->material_count; i++) {
+        number[i] = -1;
+        if (has_picture(g, i, &first)) number[i] = first == i ? textures++ : number[first];
+    }
+    for (int i = 0, reliefs = textures; i < g->material_count; i++) {
+        relief[i] = -1;
+        if (has_relief(g, i)) relief[i] = reliefs++;
+        else if (has_picture(g, i, &first) && first < i) relief[i] = relief[first];
+    }
     sink_print(json, ",\"materials\":[");
     for (int i = 0; i < g->material_count; i++) {
         const mesh_material *m = g->materials[i].material;
-        number[i] = -1;
-        if (has_picture(g, i, &first)) number[i] = first == i ? textures++ : number[first];
         sink_print(json, "%s{", i ? "," : "");
         if (g->materials[i].name) {
             sink_print(json, "\"name\":");
@@ -458,28 +519,12 @@ static void print_materials(glb *g, sink *json) {
         sink_print(json, "\"pbrMetallicRoughness\":{");
         if (number[i] >= 0) sink_print(json, "\"baseColorTexture\":{\"index\":%d},", number[i]);
         sink_print(json, "\"metallicFactor\":0,\"roughnessFactor\":1}");
+        if (relief[i] >= 0) sink_print(json, ",\"normalTexture\":{\"index\":%d}", relief[i]);
         if (m && m->is_cut_out) sink_print(json, ",\"alphaMode\":\"MASK\",\"doubleSided\":true");
         sink_print(json, "}");
     }
     sink_print(json, "]");
-    if (!textures) return;
-    sink_print(json, ",\"textures\":[");
-    for (int i = 0; i < textures; i++)
-        sink_print(json, "%s{\"sampler\":%d,\"source\":%d}", i ? "," : "", i, i);
-    sink_print(json, "],\"samplers\":[");
-    for (int i = 0, written = 0; i < g->material_count; i++) {
-        const mesh_material *m = g->materials[i].material;
-        if (!has_picture(g, i, &first) || first != i) continue;
-        sink_print(json, "%s{\"magFilter\":9729,\"minFilter\":9987,\"wrapS\":%d,\"wrapT\":%d}",
-                   written++ ? "," : "", m->repeats ? REPEAT : CLAMP, m->repeats_down ? REPEAT : CLAMP);
-    }
-    sink_print(json, "],\"images\":[");
-    for (int i = 0, written = 0; i < g->material_count; i++) {
-        if (!has_picture(g, i, &first) || first != i) continue;
-        if (written++) sink_print(json, ",");
-        print_picture(g, g->materials[i].material, json);
-    }
-    sink_print(json, "]");
+    if (textures) print_textures(g, json);
 }
 
 /* joint: node of the skeleton's root, or 0 */

@@ -80,6 +80,8 @@ typedef struct mesh_material {
     const char *texture; /* as that of mesh_scene, and the next two as well         */
     const unsigned char *png;
     size_t png_size;
+    const unsigned char *relief; /* GLB: normal map, as the picture's PNG is given; or NULL */
+    size_t relief_size;
     int repeats;    /* the picture goes on beyond its left and right borders: these fit together    */
     int is_cut_out; /* where the picture's alpha is below 1/2 there is nothing; both sides are seen */
     int repeats_down; /* as repeats, beyond its upper and lower borders                             */
