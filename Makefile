@@ -126,12 +126,12 @@ $(BUILD)/examples/forest_gl: CPPFLAGS += $(if $(SDL),-DFOREST_WINDOW) \
 bench: $(BENCHES) $(PLAIN) samples
 	@for b in $(BENCHES); do $$b $$(ls -r $(BUILD)/samples/*.png) || exit 1; done
 
-$(BUILD)/bench/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
+$(BUILD)/bench/%: bench/%.c $(wildcard bench/*.h) $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) $< $(filter %.o,$^) -o $@ $(if $(filter %/mesh.o,$^),-lcjson) $(PICTURES) -lm
 
 # the same without SIMD, for comparison
-$(BUILD)/bench/plain/%: bench/%.c bench/bench.h $(TIMED) $(SOURCES)
+$(BUILD)/bench/plain/%: bench/%.c $(wildcard bench/*.h) $(TIMED) $(SOURCES)
 	@mkdir -p $(@D)
 	$(COMPILE) -DTEXSYN_NO_SIMD -DTEXTILES_NO_SIMD -DTEXPATCH_NO_SIMD -DTEXINPAINT_NO_SIMD \
 	    $< $(filter %.o,$^) -o $@ $(if $(filter %/mesh.o,$^),-lcjson) $(PICTURES) -lm
