@@ -76,8 +76,9 @@
      Open rims get their pieces in order of decreasing radius, so that a limit on the number of
      pieces thins out the twigs and keeps the shape of the tree: this is the coarse level of detail.
      The fine one is tessellation by distance, symmetric along each edge [1, 4.4]. Wind is a sum of
-     gusts that travel across the land; each joint responds as a damped oscillator, faster the
-     thinner it is, solved exactly over each time step.
+     gusts that travel across the land; each joint responds as a damped oscillator, solved exactly
+     over each time step. The joints of an axis swing together: the trunk with the gusts, about 3
+     times in 10 seconds, branches 1 time a second and twigs 2 to 3 times, about as far for their length.
      Bark: all tiles of a set share one frame, so that any tile, and any rectangle of tiles, fits
      beside any other. A quad shows 1 to 16 of them across and 1 to 8 along, depending on its size,
      and blended tiles in the crotches, where directions of growth meet [1, 5].
@@ -441,7 +442,8 @@ typedef struct treepieces_node {
     uint8_t type;
     uint8_t joint;        /* 8 * leaf rim of the parent + turn                                    */
     uint8_t order;        /* of its axis                                                          */
-    uint8_t sway;         /* class of its oscillator, see treepieces_sway                         */
+    uint8_t sway;         /* how its axis swings, see treepieces_sway: bits 0..3 the class of its
+                             oscillator, 4..6 its phase                                           */
 } treepieces_node;
 
 /* A leaf cloud: a sphere of foliage about a point on the axis of a piece, 16 bytes. */
@@ -3222,6 +3224,32 @@ static void tpc_grow(tpc_growth *g) {
     }
 }
 
+/* ---- modes of swaying ---------------------------------------------------------------------- */
+
+enum { TPC_PHASES = 8 /* of the flutter within a class of oscillators */ };
+
+/* Does the axis that bears this piece go on at that rim of it? At forks other ones begin. */
+static int tpc_goes_on(int type, int rim) {
+    return rim == 0 && type != TREEPIECES_Y && type != TREEPIECES_SPATIAL;
+}
+
+/* One of eight phases, from the rotation of a piece, so that it does not depend on the rest of the tree. */
+static uint32_t tpc_phase(const treepieces_node *n) {
+    const uint32_t bits = tpc_float_bits(n->rotation[0]) ^ tpc_float_bits(n->rotation[2]);
+    return bits * 0x9e3779b9u >> 29;
+}
+
+/* All joints of an axis swing in one mode: with the class of the piece in which it begins, and with a
+   phase of its own. Each alone, they would cancel each other out. */
+static void tpc_set_modes(treepieces_node *nodes, uint32_t count) {
+    for (uint32_t i = 0; i < count; i++) {
+        treepieces_node *n = &nodes[i];
+        const treepieces_node *up = n->parent < 0 ? NULL : &nodes[n->parent];
+        const int goes_on = up && n->order == up->order && tpc_goes_on(up->type, n->joint >> 3);
+        n->sway = goes_on ? up->sway : (uint8_t)(n->sway + TPC_CLASSES * tpc_phase(n));
+    }
+}
+
 /* ---- a forest ------------------------------------------------------------------------------ */
 
 enum {
@@ -3363,6 +3391,7 @@ static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
         const tpc_growth *g = &p->slots[i];
         treepieces_tree *t = &p->trees[p->first + i];
         memcpy(p->nodes + p->node_count, g->nodes, (size_t)g->node_count * sizeof *p->nodes);
+        tpc_set_modes(p->nodes + p->node_count, (uint32_t)g->node_count);
         memcpy(p->bands + p->node_count, g->bands, (size_t)g->node_count * sizeof *p->bands);
         for (int k = 0; k < g->cluster_count; k++) {
             p->clusters[p->cluster_count + (size_t)k] = g->clusters[k];
@@ -3577,10 +3606,7 @@ TREEPIECES_API txm_status treepieces_forest_make(const treepieces_forest_desc *d
 
 /* ---- wind -------------------------------------------------------------------------------- */
 
-enum {
-    TPC_WAVES = 4,
-    TPC_PHASES = 8 /* of the flutter within a class of oscillators */
-};
+enum { TPC_WAVES = 4 };
 
 /* A travelling gust: weight * sin(2 pi (along . (x, z) - rate * t + phase)). */
 typedef struct tpc_wave {
@@ -3594,7 +3620,7 @@ typedef struct tpc_air {
     double time;
     struct {
         float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from the equilibrium */
-        float give;           /* radians at pressure 1 per sixteenth of the tree's height     */
+        float give; /* radians at pressure 1 per sixteenth of the tree's height               */
         float flutter[TPC_PHASES];
     } classes[TPC_CLASSES];
 } tpc_air;
@@ -3655,7 +3681,7 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
     return tpc_pressure(&air, position, time);
 }
 
-/* Class c has the frequency 0.3 * 2^(c / 4) Hz and the damping ratio d = 1/5. The step over dt is
+/* Class c has the frequency 0.3 * 2^(c / 3) Hz and the damping ratio d = 1/5. The step over dt is
    the exact solution of
 
        x'' + 2 d w x' + w^2 x = 0,   x = e^(-d w t) (a cos(k t) + b sin(k t)),  k = w sqrt(1 - d^2)
@@ -3664,7 +3690,7 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
 static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
     const double damping = 0.2, part = sqrt(1 - damping * damping);
     for (int c = 0; c < TPC_CLASSES; c++) {
-        const double frequency = 0.3 * txm_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
+        const double frequency = 0.3 * txm_exp2(c / 3.0), omega = 2 * TXM_PI * frequency;
         const double fade = damping * omega * dt;
         double e = 0, sine = 0, cosine = 0;
         if (fade < 60) { /* else the old swing has died out */
@@ -3675,12 +3701,12 @@ static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *ai
         air->classes[c].xv = txm_float(e * sine / (omega * part));
         air->classes[c].vx = txm_float(-e * omega / part * sine);
         air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
-        air->classes[c].give = txm_float(0.0065 * txm_exp2(c / 5.0));
+        air->classes[c].give = txm_float(0.0055 * txm_exp2(0.6 * c));
+        const double share = wind->gusts * (0.2 + 0.7 * (c < 4 ? c / 4.0 : 1));
         for (int k = 0; k < TPC_PHASES; k++)
             air->classes[c].flutter[k] =
-                wind->gusts * txm_float(0.5 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
-                                        0.35 * tpc_sine_of_turns(1.618 * frequency * air->time +
-                                                                 k * 0.723607));
+                txm_float(share * (0.6 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
+                                   0.4 * tpc_sine_of_turns(1.618 * frequency * air->time + k * 0.723607)));
     }
 }
 
@@ -3710,23 +3736,25 @@ static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4
     if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
 }
 
-/* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. */
-static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_t look,
-                           const float wind[3], float yield, float *state, float q[4]) {
+/* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. The
+   two directions differ in phase, so that branches move round and round. */
+static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, float yield,
+                           const float wind[3], float *state, float q[4]) {
+    const int mode = n->sway % TPC_CLASSES, phase = n->sway / TPC_CLASSES;
     const float back[4] = {-q[0], -q[1], -q[2], q[3]};
     float w[3];
     tpc_rotate(back, wind, w);
-    const float flutter = air->classes[n->sway].flutter[look & (TPC_PHASES - 1)];
-    const float other = air->classes[n->sway].flutter[look >> 3 & (TPC_PHASES - 1)];
+    const float flutter = air->classes[mode].flutter[phase];
+    const float other = air->classes[mode].flutter[(phase + 3) % TPC_PHASES];
     const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
-    const float give = air->classes[n->sway].give * txm_clampf(yield * n->length, 0.2f, 3);
+    const float give = air->classes[mode].give * txm_clampf(yield * n->length, 0.1f, 3);
     /* equilibrium, leaning with the wind: towards +z about +x, towards +x about -z */
     const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
                            txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
     for (int k = 0; k < 2; k++) {
         const float x = state[2 * k] - rest[k], v = state[2 * k + 1];
-        state[2 * k] = rest[k] + (air->classes[n->sway].xx * x + air->classes[n->sway].xv * v);
-        state[2 * k + 1] = air->classes[n->sway].vx * x + air->classes[n->sway].vv * v;
+        state[2 * k] = rest[k] + (air->classes[mode].xx * x + air->classes[mode].xv * v);
+        state[2 * k + 1] = air->classes[mode].vx * x + air->classes[mode].vv * v;
     }
     tpc_bend(q, state[0], state[2]);
 }
@@ -3764,8 +3792,7 @@ static void tpc_pose_tree(void *context, int index) {
             const float wind[3] = {pressure * (r[0] * d[0] + r[6] * d[2]),
                                    pressure * (r[1] * d[0] + r[7] * d[2]),
                                    pressure * (r[2] * d[0] + r[8] * d[2])};
-            tpc_sway_joint(p->air, n, (i * 0x9e3779b9u + t->seed) >> 16, wind, yield,
-                           p->state + 4 * (size_t)number, q);
+            tpc_sway_joint(p->air, n, yield, wind, p->state + 4 * (size_t)number, q);
         }
         const float x2 = q[0] + q[0], y2 = q[1] + q[1], z2 = q[2] + q[2];
         const float m[9] = {1 - (q[1] * y2 + q[2] * z2), q[0] * y2 - q[3] * z2, q[0] * z2 + q[3] * y2,

@@ -76,8 +76,9 @@
      Open rims get their pieces in order of decreasing radius, so that a limit on the number of
      pieces thins out the twigs and keeps the shape of the tree: this is the coarse level of detail.
      The fine one is tessellation by distance, symmetric along each edge [1, 4.4]. Wind is a sum of
-     gusts that travel across the land; each joint responds as a damped oscillator, faster the
-     thinner it is, solved exactly over each time step.
+     gusts that travel across the land; each joint responds as a damped oscillator, solved exactly
+     over each time step. The joints of an axis swing together: the trunk with the gusts, about 3
+     times in 10 seconds, branches 1 time a second and twigs 2 to 3 times, about as far for their length.
      Bark: all tiles of a set share one frame, so that any tile, and any rectangle of tiles, fits
      beside any other. A quad shows 1 to 16 of them across and 1 to 8 along, depending on its size,
      and blended tiles in the crotches, where directions of growth meet [1, 5].
@@ -441,7 +442,8 @@ typedef struct treepieces_node {
     uint8_t type;
     uint8_t joint;        /* 8 * leaf rim of the parent + turn                                    */
     uint8_t order;        /* of its axis                                                          */
-    uint8_t sway;         /* class of its oscillator, see treepieces_sway                         */
+    uint8_t sway;         /* how its axis swings, see treepieces_sway: bits 0..3 the class of its
+                             oscillator, 4..6 its phase                                           */
 } treepieces_node;
 
 /* A leaf cloud: a sphere of foliage about a point on the axis of a piece, 16 bytes. */
@@ -740,6 +742,7 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #include "treepieces/text.h"
 #include "treepieces/space.h"
 #include "treepieces/grow.h"
+#include "treepieces/modes.h"
 #include "treepieces/forest.h"
 #include "treepieces/wind.h"
 #include "treepieces/bones.h"

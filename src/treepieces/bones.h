@@ -29,23 +29,25 @@ static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4
     if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
 }
 
-/* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. */
-static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, uint32_t look,
-                           const float wind[3], float yield, float *state, float q[4]) {
+/* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. The
+   two directions differ in phase, so that branches move round and round. */
+static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, float yield,
+                           const float wind[3], float *state, float q[4]) {
+    const int mode = n->sway % TPC_CLASSES, phase = n->sway / TPC_CLASSES;
     const float back[4] = {-q[0], -q[1], -q[2], q[3]};
     float w[3];
     tpc_rotate(back, wind, w);
-    const float flutter = air->classes[n->sway].flutter[look & (TPC_PHASES - 1)];
-    const float other = air->classes[n->sway].flutter[look >> 3 & (TPC_PHASES - 1)];
+    const float flutter = air->classes[mode].flutter[phase];
+    const float other = air->classes[mode].flutter[(phase + 3) % TPC_PHASES];
     const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
-    const float give = air->classes[n->sway].give * txm_clampf(yield * n->length, 0.2f, 3);
+    const float give = air->classes[mode].give * txm_clampf(yield * n->length, 0.1f, 3);
     /* equilibrium, leaning with the wind: towards +z about +x, towards +x about -z */
     const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
                            txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
     for (int k = 0; k < 2; k++) {
         const float x = state[2 * k] - rest[k], v = state[2 * k + 1];
-        state[2 * k] = rest[k] + (air->classes[n->sway].xx * x + air->classes[n->sway].xv * v);
-        state[2 * k + 1] = air->classes[n->sway].vx * x + air->classes[n->sway].vv * v;
+        state[2 * k] = rest[k] + (air->classes[mode].xx * x + air->classes[mode].xv * v);
+        state[2 * k + 1] = air->classes[mode].vx * x + air->classes[mode].vv * v;
     }
     tpc_bend(q, state[0], state[2]);
 }
@@ -83,8 +85,7 @@ static void tpc_pose_tree(void *context, int index) {
             const float wind[3] = {pressure * (r[0] * d[0] + r[6] * d[2]),
                                    pressure * (r[1] * d[0] + r[7] * d[2]),
                                    pressure * (r[2] * d[0] + r[8] * d[2])};
-            tpc_sway_joint(p->air, n, (i * 0x9e3779b9u + t->seed) >> 16, wind, yield,
-                           p->state + 4 * (size_t)number, q);
+            tpc_sway_joint(p->air, n, yield, wind, p->state + 4 * (size_t)number, q);
         }
         const float x2 = q[0] + q[0], y2 = q[1] + q[1], z2 = q[2] + q[2];
         const float m[9] = {1 - (q[1] * y2 + q[2] * z2), q[0] * y2 - q[3] * z2, q[0] * z2 + q[3] * y2,

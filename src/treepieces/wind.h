@@ -1,14 +1,11 @@
 #ifndef TREEPIECES_WIND_H
 #define TREEPIECES_WIND_H
 
-#include "grow.h"
+#include "modes.h"
 
 /* ---- wind -------------------------------------------------------------------------------- */
 
-enum {
-    TPC_WAVES = 4,
-    TPC_PHASES = 8 /* of the flutter within a class of oscillators */
-};
+enum { TPC_WAVES = 4 };
 
 /* A travelling gust: weight * sin(2 pi (along . (x, z) - rate * t + phase)). */
 typedef struct tpc_wave {
@@ -22,7 +19,7 @@ typedef struct tpc_air {
     double time;
     struct {
         float xx, xv, vx, vv; /* (x, v) -> (xx x + xv v, vx x + vv v), x from the equilibrium */
-        float give;           /* radians at pressure 1 per sixteenth of the tree's height     */
+        float give; /* radians at pressure 1 per sixteenth of the tree's height               */
         float flutter[TPC_PHASES];
     } classes[TPC_CLASSES];
 } tpc_air;
@@ -83,7 +80,7 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
     return tpc_pressure(&air, position, time);
 }
 
-/* Class c has the frequency 0.3 * 2^(c / 4) Hz and the damping ratio d = 1/5. The step over dt is
+/* Class c has the frequency 0.3 * 2^(c / 3) Hz and the damping ratio d = 1/5. The step over dt is
    the exact solution of
 
        x'' + 2 d w x' + w^2 x = 0,   x = e^(-d w t) (a cos(k t) + b sin(k t)),  k = w sqrt(1 - d^2)
@@ -92,7 +89,7 @@ TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float po
 static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *air) {
     const double damping = 0.2, part = sqrt(1 - damping * damping);
     for (int c = 0; c < TPC_CLASSES; c++) {
-        const double frequency = 0.3 * txm_exp2(c / 4.0), omega = 2 * TXM_PI * frequency;
+        const double frequency = 0.3 * txm_exp2(c / 3.0), omega = 2 * TXM_PI * frequency;
         const double fade = damping * omega * dt;
         double e = 0, sine = 0, cosine = 0;
         if (fade < 60) { /* else the old swing has died out */
@@ -103,12 +100,12 @@ static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *ai
         air->classes[c].xv = txm_float(e * sine / (omega * part));
         air->classes[c].vx = txm_float(-e * omega / part * sine);
         air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
-        air->classes[c].give = txm_float(0.0065 * txm_exp2(c / 5.0));
+        air->classes[c].give = txm_float(0.0055 * txm_exp2(0.6 * c));
+        const double share = wind->gusts * (0.2 + 0.7 * (c < 4 ? c / 4.0 : 1));
         for (int k = 0; k < TPC_PHASES; k++)
             air->classes[c].flutter[k] =
-                wind->gusts * txm_float(0.5 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
-                                        0.35 * tpc_sine_of_turns(1.618 * frequency * air->time +
-                                                                 k * 0.723607));
+                txm_float(share * (0.6 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
+                                   0.4 * tpc_sine_of_turns(1.618 * frequency * air->time + k * 0.723607)));
     }
 }
 

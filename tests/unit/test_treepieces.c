@@ -429,6 +429,102 @@ static void test_wind(void **state) {
     treepieces_forest_free(f);
 }
 
+/* How something moves: mean and standard deviation, and how often a second it passes the mean. */
+typedef struct motion {
+    double mean, deviation, passes;
+} motion;
+
+static motion motion_of(const float *way, int count, double rate) {
+    motion m = {0, 0, 0};
+    for (int i = 0; i < count; i++) m.mean += (double)way[i] / count;
+    for (int i = 0; i < count; i++) {
+        const double off = (double)way[i] - m.mean;
+        m.deviation += off * off / count;
+        if (i && off * ((double)way[i - 1] - m.mean) < 0) m.passes += rate / count;
+    }
+    m.deviation = sqrt(m.deviation);
+    return m;
+}
+
+/* The end of a piece along the wind, which blows to +x: of a trunk in the world, of others as seen from
+   the piece on which their axis stands; over the distance that it has from there at rest. */
+static float way_of(const treepieces_forest *f, const float *rest, const float *bones, uint32_t node) {
+    uint32_t base = node;
+    float from[2][3], along = 0, square = 0, length = 0;
+    while (f->nodes[base].parent >= 0 && f->nodes[base].order >= f->nodes[node].order)
+        base = (uint32_t)f->nodes[base].parent;
+    for (int k = 0; k < 3; k++) {
+        const size_t row = 4 * (size_t)k, b = TREEPIECES_BONE * (size_t)base, n = TREEPIECES_BONE * (size_t)node;
+        from[0][k] = bones[n + row + 3] + bones[n + row + 1] - bones[b + row + 3];
+        from[1][k] = rest[n + row + 3] + rest[n + row + 1] - rest[b + row + 3];
+        along += bones[b + row] * from[0][k];
+        square += bones[b + row] * bones[b + row];
+        length += from[1][k] * from[1][k];
+    }
+    const float way = f->nodes[node].order ? along / sqrtf(square) : from[0][0];
+    return way / sqrtf(length);
+}
+
+/* In a fresh breeze the top of the trunk moves by some hundredths of the height; branches swing as far for
+   their length, and faster, twigs faster still. All joints of a branch swing together. */
+static void test_sway_has_scales(void **state) {
+    (void)state;
+    enum { STEPS = 900, RATE = 30 };
+    static const char *const names[] = {"oak", "birch", "almond"};
+    for (int s = 0; s < 3; s++) {
+        treepieces_forest_desc d = describe(1, 500);
+        treepieces_species species;
+        assert_int_equal(treepieces_preset(names[s], NULL, &species), TXM_OK);
+        d.species = &species;
+        treepieces_forest *f = grow(&d);
+        const uint32_t nodes = f->node_count;
+        float *rest = make_bones(f, NULL), *bones = make_bones(f, NULL);
+        float *sway = (float *)room(nodes, 16), *way = (float *)room(nodes, STEPS * sizeof(float));
+        const treepieces_wind wind = {0, 8, 0.6f, 1};
+        uint32_t top = 0;
+        for (int i = -20 * RATE; i < STEPS; i++) {
+            const double time = (double)i / RATE;
+            assert_int_equal(treepieces_sway(f, &wind, time, 1.0 / RATE, NULL, NULL, sway, bones), TXM_OK);
+            for (uint32_t n = 0; n < nodes && i >= 0; n++)
+                way[n * (size_t)STEPS + (size_t)i] = way_of(f, rest, bones, n);
+        }
+        double deviation[3] = {0, 0, 0}, passes[3] = {0, 0, 0}; /* of trunk, branches, twigs */
+        int counts[3] = {1, 0, 0};
+        for (uint32_t n = 0; n < nodes; n++) {
+            const int order = f->nodes[n].order < 2 ? f->nodes[n].order : 2;
+            const int32_t up = f->nodes[n].parent;
+            if (up >= 0 && f->nodes[up].type == TREEPIECES_I)
+                assert_int_equal(f->nodes[n].sway, f->nodes[up].sway);
+            if (order == 0 && rest[12 * n + 7] > rest[12 * top + 7]) top = n;
+            if (order == 0 || f->nodes[n].type != TREEPIECES_TIP) continue;
+            const motion m = motion_of(way + n * (size_t)STEPS, STEPS, RATE);
+            deviation[order] += m.deviation;
+            passes[order] += m.passes;
+            counts[order]++;
+        }
+        for (int i = 0; i < STEPS; i++) way[(size_t)top * STEPS + (size_t)i] -= way_of(f, rest, rest, top);
+        const motion trunk = motion_of(way + (size_t)top * STEPS, STEPS, RATE);
+        deviation[0] = trunk.deviation;
+        passes[0] = trunk.passes;
+        for (int k = 0; k < 3; k++) {
+            assert_true(counts[k] > 0);
+            deviation[k] /= counts[k];
+            passes[k] /= counts[k];
+            print_message("# %s, order %d: deviation %.4f of the length, %.2f passes a second\n", names[s], k,
+                          deviation[k], passes[k]);
+        }
+        assert_true(trunk.mean > 0.01 && trunk.mean < 0.1); /* leans with the wind */
+        assert_true(deviation[0] > 0.004 && deviation[0] < 0.04);
+        assert_true(deviation[1] > 0.7 * deviation[0] && deviation[1] < 0.12);
+        assert_true(passes[1] > 2 * passes[0] && passes[2] > 1.3 * passes[1] && passes[2] < 8);
+        free(way);
+        free(sway);
+        free(bones);
+        free(rest);
+        treepieces_forest_free(f);
+    }
+}
+
 /* Trees of one seed in different places do not sway in unison: the correlation of their tops. */
 static void test_no_unison(void **state) {
     (void)state;
@@ -614,6 +710,7 @@ int main(void) {
         cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
         cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
         cmocka_unit_test(test_memory),    cmocka_unit_test(test_scatter),
+        cmocka_unit_test(test_sway_has_scales),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
