@@ -91,4 +91,24 @@ static inline void free_grown(grown *g) {
     free(g->bones);
 }
 
+/* ---- pictures ---- */
+
+static inline txm_image make_image(int width, int height, int channels, txm_sample sample) {
+    const size_t pixel = (size_t)channels * txm_sample_bytes(sample);
+    void *pixels = room((size_t)width * (size_t)height, pixel);
+    return view(pixels, width, height, channels, sample);
+}
+
+static inline size_t image_bytes(const txm_image *i) {
+    return (size_t)i->width * (size_t)i->height * (size_t)i->channels * txm_sample_bytes(i->sample);
+}
+
+static inline uint64_t hash_image(const txm_image *i) {
+    return tk_hash(0, i->pixels, image_bytes(i));
+}
+
+static inline const uint8_t *rgba(const txm_image *i, int x, int y) {
+    return (const uint8_t *)txm_image_row_const(i, y) + 4 * x;
+}
+
 #endif /* GROWKIT_H */
