@@ -603,6 +603,8 @@ typedef struct treepieces_mesh {
     float *positions, *normals; /* 3 per vertex                                                   */
     uint32_t *joints;           /* 4 per vertex: nodes of the tree; 0 where the weight is 0       */
     float *weights;             /* 4 per vertex, sum 1                                            */
+    uint8_t *colors;            /* 4 per vertex, R G B and 255: sRGB factors of the picture. Young bark is
+                                   darker, as are leaves inside the crown                         */
     uint32_t *indices;          /* 3 per triangle, counter-clockwise from outside                 */
     float *uvs;                 /* 2 per corner, so 6 per triangle; v downwards. Into the sheet of
                                    treepieces_bark, or into the leaf image                        */
@@ -4514,8 +4516,8 @@ static float tpc_signed(txm_rng *rng) {
 }
 
 /* Orient a card: its image grows along `along`, and its face is turned to `facing` as far as that
-   allows. outward: normal of the cloud's surface there; the card is shaded as part of that surface,
-   but mostly as the twig that it shows. */
+   allows, or with its back. outward: normal of the cloud's surface there, to which its front is turned;
+   the card is shaded as something between that surface and a flat twig. */
 static void tpc_orient_card(treepieces_card *card, float along[3], float facing[3],
                             const float outward[3], float wide, float high) {
     tpc_unit_or(along, 1, 0, 0);
@@ -4527,13 +4529,14 @@ static void tpc_orient_card(treepieces_card *card, float along[3], float facing[
         facing[2] = 0;
     }
     tpc_unit_or(facing, 1, 0, 0);
+    if (tpc_dot(facing, outward) < 0)
+        for (int k = 0; k < 3; k++) facing[k] = -facing[k];
     float right[3];
     tpc_cross(along, facing, right);
-    const float side = tpc_dot(facing, outward) < 0 ? -0.7f : 0.7f;
     for (int k = 0; k < 3; k++) {
         card->right[k] = wide * right[k];
         card->up[k] = high * along[k];
-        card->normal[k] = 0.7f * outward[k] + side * facing[k];
+        card->normal[k] = outward[k] + facing[k];
     }
     tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }
@@ -5344,6 +5347,7 @@ static int tpc_alloc_mesh(tpc_mesh *made, size_t vertices, size_t triangles) {
     m->normals = (float *)txm_arena_alloc(&made->arena, vertices, 3 * sizeof(float));
     m->joints = (uint32_t *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(uint32_t));
     m->weights = (float *)txm_arena_alloc(&made->arena, vertices, 4 * sizeof(float));
+    m->colors = (uint8_t *)txm_arena_alloc(&made->arena, vertices, 4);
     m->indices = (uint32_t *)txm_arena_alloc(&made->arena, triangles, 3 * sizeof(uint32_t));
     m->uvs = (float *)txm_arena_alloc(&made->arena, triangles, 6 * sizeof(float));
     return !made->arena.failed;
@@ -5380,7 +5384,39 @@ typedef struct tpc_baking {
     /* the current piece */
     float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
     uint32_t joints[4];
+    float radii[4]; /* of the joints' bones, metres */
 } tpc_baking;
+
+/* Ours, see docs/choices.md#choices-in-treepiecesh: bark of less than the first radius is young, of more than the
+   second it is old; dirt reaches so high. Metres. */
+static const float tpc_young_radius = 0.012f, tpc_old_radius = 0.05f, tpc_dirt_height = 0.8f;
+
+static void tpc_put_color(const float color[3], uint8_t out[4]) {
+    for (int k = 0; k < 3; k++) out[k] = (uint8_t)(255 * txm_clampf(color[k], 0, 1) + 0.5f);
+    out[3] = 255;
+}
+
+/* The color of bark by the radius of the stem and the height above the ground: twigs are browner than
+   the trunk, above all where that is pale. */
+static void tpc_age_color(const treepieces_species *species, float radius, float height, uint8_t out[4]) {
+    static const float brown[3] = {0.76f, 0.69f, 0.64f};
+    const float *bark = species->bark_color;
+    const float pale = txm_clampf((bark[0] + bark[1] + bark[2] - 1.6f) / 0.6f, 0, 1);
+    const float young = tpc_fade((radius - tpc_young_radius) / (tpc_old_radius - tpc_young_radius));
+    const float clean = 1 - 0.12f * tpc_fade(height / tpc_dirt_height);
+    float color[3];
+    for (int k = 0; k < 3; k++)
+        color[k] = clean * txm_lerpf(1, brown[k] * (1 - 0.4f * pale), young);
+    tpc_put_color(color, out);
+}
+
+/* Note the bones that move the vertices of the current piece. */
+static void tpc_note_radii(tpc_baking *b) {
+    for (int k = 0; k < 4; k++) {
+        const float *bone = b->desc->bones + TREEPIECES_BONE * ((size_t)b->tree->first_node + b->joints[k]);
+        b->radii[k] = sqrtf(bone[0] * bone[0] + bone[4] * bone[4] + bone[8] * bone[8]);
+    }
+}
 
 static int tpc_is_tessellated(const tpc_baking *b) {
     return b->lod.max_level > 1;
@@ -5418,10 +5454,14 @@ static uint32_t tpc_weld(tpc_baking *b, const float position[3], const float nor
     b->table[slot & b->table_mask] = (uint32_t)i + 1;
     memcpy(m->positions + 3 * i, bits, sizeof bits);
     memcpy(m->normals + 3 * i, normal, 3 * sizeof *normal);
+    float radius = 0;
     for (int k = 0; k < 4; k++) {
         m->joints[4 * i + (size_t)k] = weights[k] > 0 ? b->joints[k] : 0;
         m->weights[4 * i + (size_t)k] = weights[k];
+        radius += weights[k] * b->radii[k];
     }
+    tpc_age_color(&b->forest->species[b->tree->species], radius, position[1] - b->tree->position[1],
+                  m->colors + 4 * i);
     return (uint32_t)i;
 }
 
@@ -5532,6 +5572,7 @@ static txm_status tpc_bake_tree(tpc_baking *b, txm_env *env, size_t *vertices, s
             tpc_children(record, b->joints + 1);
             b->joints[0] = own;
             for (int k = 1; k < 4; k++) b->joints[k] += own;
+            tpc_note_radii(b);
             for (int k = 0; k < piece->quad_count; k++) {
                 float positions[12];
                 int edges[4], more;
@@ -5595,7 +5636,8 @@ static void tpc_bake_cap(tpc_baking *b) {
     tpc_cap cap;
     const uint32_t first = tpc_first_record(&b->forest->batches[type], b->tree, &records);
     treepieces_skin(b->forest, b->desc->bones, type, first, b->positions, b->normals);
-    b->joints[0] = 0;
+    memset(b->joints, 0, sizeof b->joints);
+    tpc_note_radii(b);
     tpc_find_cap(b, &b->forest->kit->pieces[type], &cap);
     const int is_fine = cap.count > TREEPIECES_RIM, hub = is_fine ? cap.count : 0;
     if (is_fine) {
@@ -5685,7 +5727,13 @@ typedef struct tpc_placed_cloud {
     float sine, cosine;
     float crown[3]; /* the middle of the crown */
     uint32_t joint;
+    uint8_t color[4];
 } tpc_placed_cloud;
+
+/* The middle of a crown and, along each axis, about half its width. */
+typedef struct tpc_crown {
+    float middle[3], reach[3];
+} tpc_crown;
 
 static void tpc_cluster_center(const treepieces_cluster *c, const float *bones, float center[3]) {
     const float *bone = bones + (size_t)c->node * TREEPIECES_BONE;
@@ -5693,15 +5741,25 @@ static void tpc_cluster_center(const treepieces_cluster *c, const float *bones, 
 }
 
 static void tpc_place_cloud(const treepieces_cluster *c, const float *bones, uint32_t first_node,
-                            const float crown[3], tpc_placed_cloud *cloud) {
+                            const tpc_crown *crown, tpc_placed_cloud *cloud) {
     double sine, cosine;
+    float off[3], color[3];
     txm_sincos((double)(c->look >> 8 & 255u) * (TXM_PI / 128), &sine, &cosine);
     tpc_cluster_center(c, bones, cloud->center);
     cloud->radius = c->radius;
     cloud->sine = txm_float(sine);
     cloud->cosine = txm_float(cosine);
-    memcpy(cloud->crown, crown, sizeof cloud->crown);
+    memcpy(cloud->crown, crown->middle, sizeof cloud->crown);
     cloud->joint = c->node - first_node;
+    /* darker inside; lighter or darker, yellower or bluer at random */
+    for (int k = 0; k < 3; k++) off[k] = (cloud->center[k] - crown->middle[k]) / crown->reach[k];
+    const float inside = tpc_fade(tpc_dot(off, off));
+    const float warm = (float)(c->look >> 16 & 255u) / 255 - 0.5f, light = (float)(c->look >> 24) / 255 - 0.5f;
+    for (int k = 0; k < 3; k++) {
+        static const float tints[3] = {0.1f, 0, -0.12f};
+        color[k] = (0.96f - 0.3f * inside) * (1 + 0.1f * light) * (1 + tints[k] * warm);
+    }
+    tpc_put_color(color, cloud->color);
 }
 
 static void tpc_turn_cloud(const tpc_placed_cloud *cloud, const float v[3], float out[3]) {
@@ -5711,12 +5769,13 @@ static void tpc_turn_cloud(const tpc_placed_cloud *cloud, const float v[3], floa
 }
 
 /* Write card number `index` of the mesh. Its normal is bent outwards, so that light runs round the
-   crown and not round each cloud. */
+   crown and not round each cloud; its front is turned there, mirrored if need be, as renderers turn
+   the normals of backs round. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
                           const tpc_placed_cloud *cloud) {
     static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
     static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
-    float center[3], right[3], up[3], own[3], normal[3];
+    float center[3], right[3], up[3], own[3], normal[3], face[3];
     tpc_turn_cloud(cloud, card->center, center);
     tpc_turn_cloud(cloud, card->right, right);
     tpc_turn_cloud(cloud, card->up, up);
@@ -5728,6 +5787,9 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
     tpc_unit_or(normal, own[0], own[1], own[2]);
     for (int a = 0; a < 3; a++) normal[a] = 0.8f * normal[a] + 0.6f * own[a];
     tpc_unit_or(normal, own[0], own[1], own[2]);
+    tpc_cross(right, up, face);
+    if (tpc_dot(face, normal) < 0)
+        for (int k = 0; k < 3; k++) right[k] = -right[k];
     for (size_t k = 0; k < 4; k++) {
         const size_t vertex = 4 * index + k;
         for (size_t a = 0; a < 3; a++) {
@@ -5738,6 +5800,7 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
         for (size_t j = 0; j < 4; j++) {
             m->joints[4 * vertex + j] = j ? 0 : cloud->joint;
             m->weights[4 * vertex + j] = j ? 0 : 1;
+            m->colors[4 * vertex + j] = cloud->color[j];
         }
     }
     for (size_t k = 0; k < 6; k++) {
@@ -5747,17 +5810,25 @@ static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_car
     }
 }
 
-/* The mean of the centres of the leaf clouds. */
-static void tpc_crown_middle(const treepieces_forest *forest, const treepieces_tree *t,
-                             const float *bones, float middle[3]) {
-    double sum[3] = {0, 0, 0};
+/* The mean of the centres of the leaf clouds, and how far they spread. */
+static void tpc_measure_crown(const treepieces_forest *forest, const treepieces_tree *t,
+                              const float *bones, tpc_crown *crown) {
+    double sum[3] = {0, 0, 0}, square[3] = {0, 0, 0};
+    const double count = t->cluster_count ? t->cluster_count : 1;
     float center[3];
     for (uint32_t i = 0; i < t->cluster_count; i++) {
         tpc_cluster_center(&forest->clusters[t->first_cluster + i], bones, center);
-        for (int k = 0; k < 3; k++) sum[k] += (double)center[k];
+        for (int k = 0; k < 3; k++) {
+            const double off = (double)(center[k] - t->position[k]);
+            sum[k] += off;
+            square[k] += off * off;
+        }
     }
-    for (int k = 0; k < 3; k++)
-        middle[k] = t->cluster_count ? txm_float(sum[k] / (double)t->cluster_count) : 0;
+    for (int k = 0; k < 3; k++) {
+        const double mean = sum[k] / count, spread = square[k] / count - mean * mean;
+        crown->middle[k] = t->position[k] + txm_float(mean);
+        crown->reach[k] = 1.9f * sqrtf(txm_maxf(txm_float(spread), 0)) + 0.01f;
+    }
 }
 
 TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest, int tree,
@@ -5788,13 +5859,13 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
     }
     for (int k = 0; k < looks && status == TXM_OK; k++)
         treepieces_cloud(species, (uint32_t)k, cards + (size_t)k * count);
-    float crown[3];
-    tpc_crown_middle(forest, t, bones, crown);
+    tpc_crown crown;
+    tpc_measure_crown(forest, t, bones, &crown);
     for (uint32_t i = 0; i < t->cluster_count && status == TXM_OK; i++) {
         const treepieces_cluster *c = &forest->clusters[t->first_cluster + i];
         const treepieces_card *look = cards + (size_t)(c->look % (uint32_t)looks) * count;
         tpc_placed_cloud cloud;
-        tpc_place_cloud(c, bones, t->first_node, crown, &cloud);
+        tpc_place_cloud(c, bones, t->first_node, &crown, &cloud);
         for (size_t k = 0; k < count; k++) tpc_bake_card(&made->mesh, count * i + k, &look[k], &cloud);
     }
     txm_arena_free(&scratch);

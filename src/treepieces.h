@@ -603,6 +603,8 @@ typedef struct treepieces_mesh {
     float *positions, *normals; /* 3 per vertex                                                   */
     uint32_t *joints;           /* 4 per vertex: nodes of the tree; 0 where the weight is 0       */
     float *weights;             /* 4 per vertex, sum 1                                            */
+    uint8_t *colors;            /* 4 per vertex, R G B and 255: sRGB factors of the picture. Young bark is
+                                   darker, as are leaves inside the crown                         */
     uint32_t *indices;          /* 3 per triangle, counter-clockwise from outside                 */
     float *uvs;                 /* 2 per corner, so 6 per triangle; v downwards. Into the sheet of
                                    treepieces_bark, or into the leaf image                        */

@@ -11,8 +11,8 @@ static float tpc_signed(txm_rng *rng) {
 }
 
 /* Orient a card: its image grows along `along`, and its face is turned to `facing` as far as that
-   allows. outward: normal of the cloud's surface there; the card is shaded as part of that surface,
-   but mostly as the twig that it shows. */
+   allows, or with its back. outward: normal of the cloud's surface there, to which its front is turned;
+   the card is shaded as something between that surface and a flat twig. */
 static void tpc_orient_card(treepieces_card *card, float along[3], float facing[3],
                             const float outward[3], float wide, float high) {
     tpc_unit_or(along, 1, 0, 0);
@@ -24,13 +24,14 @@ static void tpc_orient_card(treepieces_card *card, float along[3], float facing[
         facing[2] = 0;
     }
     tpc_unit_or(facing, 1, 0, 0);
+    if (tpc_dot(facing, outward) < 0)
+        for (int k = 0; k < 3; k++) facing[k] = -facing[k];
     float right[3];
     tpc_cross(along, facing, right);
-    const float side = tpc_dot(facing, outward) < 0 ? -0.7f : 0.7f;
     for (int k = 0; k < 3; k++) {
         card->right[k] = wide * right[k];
         card->up[k] = high * along[k];
-        card->normal[k] = 0.7f * outward[k] + side * facing[k];
+        card->normal[k] = outward[k] + facing[k];
     }
     tpc_unit_or(card->normal, outward[0], outward[1], outward[2]);
 }

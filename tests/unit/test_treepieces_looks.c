@@ -27,6 +27,9 @@ static void check_card(const treepieces_card *c) {
     assert_true(width > 0 && height > 0);
     assert_true(fabsf(dot(c->right, c->up)) < 1e-5f * (width + height));
     assert_true(fabsf(dot(c->normal, c->normal) - 1) < 1e-4f);
+    const float *r = c->right, *u = c->up;
+    const float front[3] = {r[1] * u[2] - r[2] * u[1], r[2] * u[0] - r[0] * u[2], r[0] * u[1] - r[1] * u[0]};
+    assert_true(dot(front, c->normal) > 0); /* lit on its front */
     for (int k = 0; k < 4; k++) { /* all of it lies in the sphere, where impostors see it */
         float p[3];
         for (int a = 0; a < 3; a++)
@@ -616,6 +619,10 @@ static void check_baked(const grown *g, const treepieces_tree *tree, const doubl
         normal[a] = 0.8f * outward[a] / sqrtf(dot(outward, outward)) + 0.6f * own[a];
     size = sqrtf(dot(normal, normal));
     for (int a = 0; a < 3; a++) normal[a] /= size;
+    /* the front is where the normal points */
+    const float face[3] = {right[1] * up[2] - right[2] * up[1], right[2] * up[0] - right[0] * up[2],
+                           right[0] * up[1] - right[1] * up[0]};
+    for (int a = 0; a < 3 && dot(face, normal) < 0; a++) right[a] = -right[a];
     for (size_t v = 4 * i; v < 4 * i + 4; v++) {
         assert_int_equal(m->joints[4 * v], cluster->node - tree->first_node);
         assert_true(m->weights[4 * v] == 1);
@@ -681,6 +688,67 @@ static void test_bake_leaves(void **state) {
     free_grown(&g);
 }
 
+/* Factors of the picture: those of bark get darker with the radius of the stem, most on a birch, and near
+   the ground; those of leaves towards the middle of the crown. */
+static void test_colors(void **state) {
+    (void)state;
+    double mean[2][3][2]; /* of oak and birch; trunk, twigs, foot; sum and count */
+    treepieces_species species;
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(treepieces_preset(i ? "birch" : "oak", NULL, &species), TXM_OK);
+        treepieces_forest_desc d = describe(1, 400);
+        treepieces_bake_desc desc;
+        treepieces_mesh *m;
+        d.species = &species;
+        grown g = grow_posed(&d, 0, 1);
+        const treepieces_tree *tree = &g.forest->trees[0];
+        memset(&desc, 0, sizeof desc);
+        memset(mean[i], 0, sizeof mean[i]);
+        desc.forest = g.forest;
+        desc.bones = g.bones;
+        assert_int_equal(treepieces_bake(&desc, NULL, &m), TXM_OK);
+        for (size_t v = 0; v < m->vertex_count; v++) {
+            const uint8_t *c = m->colors + 4 * v;
+            const float height = m->positions[3 * v + 1] - tree->position[1];
+            assert_int_equal(c[3], 255);
+            if (m->weights[4 * v] < 1) continue;
+            const float radius = g.forest->nodes[m->joints[4 * v]].radius;
+            const int kind = radius < 0.012f ? 1 : radius < 0.06f ? -1 : height > 0.9f ? 0 : height < 0.05f ? 2 : -1;
+            if (kind < 0) continue;
+            if (kind == 0) assert_in_range(c[0] + c[1] + c[2], 760, 765);
+            mean[i][kind][0] += c[0] + c[1] + c[2];
+            mean[i][kind][1]++;
+        }
+        treepieces_mesh_free(m);
+        assert_int_equal(treepieces_bake_leaves(g.forest, 0, g.bones, 4, NULL, &m), TXM_OK);
+        double middle[3] = {0, 0, 0}, light[2] = {0, 0}, count[2] = {0, 0}, far = 0;
+        for (size_t v = 0; v < 3 * m->vertex_count; v++)
+            middle[v % 3] += (double)m->positions[v] / (double)m->vertex_count;
+        for (int pass = 0; pass < 2; pass++) {
+            for (size_t v = 0; v < m->vertex_count; v++) {
+                const uint8_t *c = m->colors + 4 * v;
+                double square = 0;
+                for (size_t k = 0; k < 3; k++) {
+                    const double off = (double)m->positions[3 * v + k] - middle[k];
+                    square += off * off;
+                }
+                if (pass == 0 && square > far) far = square;
+                const int is_outside = square > 0.3 * far, is_inside = square < 0.03 * far;
+                if (pass == 0 || !(is_outside || is_inside)) continue;
+                light[is_inside] += c[0] + c[1] + c[2];
+                count[is_inside]++;
+            }
+        }
+        assert_true(count[0] > 100 && count[1] > 100);
+        assert_true(light[1] / count[1] < 0.9 * light[0] / count[0]);
+        treepieces_mesh_free(m);
+        free_grown(&g);
+    }
+    for (int i = 0; i < 2; i++) assert_true(mean[i][2][0] / mean[i][2][1] < 690);
+    assert_true(mean[1][1][1] > 10); /* an oak's twigs are thicker */
+    assert_true(mean[1][1][0] / mean[1][1][1] < 420);
+}
+
 static txm_status bake_leaves(void *context, txm_env *env) {
     const grown *g = (const grown *)context;
     treepieces_mesh *m = (treepieces_mesh *)env;
@@ -712,13 +780,14 @@ static void test_bake_leaves_faults(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cloud),           cmocka_unit_test(test_looks),
-        cmocka_unit_test(test_cloud_spread), cmocka_unit_test(test_cloud_kinds),    cmocka_unit_test(test_leaves),
+        cmocka_unit_test(test_cloud_spread),    cmocka_unit_test(test_cloud_kinds),
+        cmocka_unit_test(test_leaves),
         cmocka_unit_test(test_leaves_repeat),   cmocka_unit_test(test_leaves_sizes),
         cmocka_unit_test(test_leaves_refusals), cmocka_unit_test(test_impostor),
         cmocka_unit_test(test_impostor_behind), cmocka_unit_test(test_impostor_card),
         cmocka_unit_test(test_impostor_refusals), cmocka_unit_test(test_bake_leaves),
         cmocka_unit_test(test_hidden_colors),
-        cmocka_unit_test(test_bake_leaves_faults),
+        cmocka_unit_test(test_bake_leaves_faults), cmocka_unit_test(test_colors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -87,10 +87,11 @@ static int extend(mesh_data *m, size_t vertices, size_t triangles, int with_uvs,
     return 1;
 }
 
-/* Append a tree's bark or leaves to a mesh. color: sRGB, instead of uvs. */
+/* Append a tree's bark or leaves to a mesh. color: sRGB, instead of uvs; in GLB, the colors that go with
+   the picture. */
 static int append(tree_job *j, const treepieces_mesh *from, const float *color, mesh_data *to) {
     const size_t base = to->vertex_count, first = 3 * to->triangle_count;
-    if (!extend(to, from->vertex_count, from->triangle_count, !color, color != NULL))
+    if (!extend(to, from->vertex_count, from->triangle_count, !color, color || tree_is_glb(j)))
         return fail_memory(&j->run);
     memcpy(to->positions + 3 * base, from->positions, 3 * from->vertex_count * sizeof(float));
     memcpy(to->normals + 3 * base, from->normals, 3 * from->vertex_count * sizeof(float));
@@ -98,10 +99,11 @@ static int append(tree_job *j, const treepieces_mesh *from, const float *color, 
         to->indices[first + c] = (uint32_t)(base + from->indices[c]);
     if (!color)
         memcpy(to->uvs + 2 * first, from->uvs, 6 * from->triangle_count * sizeof(float));
+    if (!color && tree_is_glb(j)) memcpy(to->colors + 4 * base, from->colors, 4 * from->vertex_count);
     for (size_t i = 0; i < from->vertex_count && color; i++) {
         for (size_t k = 0; k < 3; k++)
             to->colors[4 * (base + i) + k] =
-                (unsigned char)(255 * txm_clampf(color[k], 0, 1) + 0.5f);
+                (unsigned char)(from->colors[4 * i + k] * txm_clampf(color[k], 0, 1) + 0.5f);
         to->colors[4 * (base + i) + 3] = 255;
     }
     to->vertex_count += from->vertex_count;
@@ -210,6 +212,7 @@ static int rigged_view(tree_job *j, const tree_rig *rig, const treepieces_mesh *
     to->normals = from->normals;
     to->indices = from->indices;
     to->uvs = from->uvs;
+    to->colors = from->colors;
     return tree_bind_mesh(j, rig, from, to);
 }
 

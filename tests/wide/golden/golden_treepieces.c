@@ -57,6 +57,7 @@ static uint64_t mesh_hash(const treepieces_mesh *mesh, uint64_t hash) {
     hash = golden_hash(hash, mesh->normals, 3 * mesh->vertex_count * sizeof(float), 4);
     hash = golden_hash(hash, mesh->joints, 4 * mesh->vertex_count * sizeof(uint32_t), 4);
     hash = golden_hash(hash, mesh->weights, 4 * mesh->vertex_count * sizeof(float), 4);
+    hash = tk_hash(hash, mesh->colors, 4 * mesh->vertex_count);
     hash = golden_hash(hash, mesh->indices, 3 * mesh->triangle_count * sizeof(uint32_t), 4);
     return golden_hash(hash, mesh->uvs, 6 * mesh->triangle_count * sizeof(float), 4);
 }
