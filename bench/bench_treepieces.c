@@ -49,7 +49,7 @@ static treepieces_forest *grow(const treepieces_forest_desc *desc, txm_env *env,
 }
 
 static double sway(const treepieces_forest *forest, float *state, float *bones) {
-    const treepieces_wind wind = {0.3f, 8, 0.6f, 1};
+    const treepieces_wind wind = {0.3f, 8, 0.6f, 1, 0};
     result best = no_result;
     for (int i = 0; i < RUNS; i++) {
         const watch w = start();

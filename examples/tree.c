@@ -79,7 +79,7 @@ static void put_mesh(FILE *file, const char *material, const treepieces_mesh *m,
 
 /* Wood and leaves of a tree in a moderate wind. */
 static const char *write_tree(const treepieces_forest *tree, txm_env *env, const char *name) {
-    const treepieces_wind wind = {0.4f, 6, 0.5f, 1}; /* direction, m/s, gusts, seed */
+    const treepieces_wind wind = {0.4f, 6, 0.5f, 1, 0}; /* direction, m/s, gusts, seed */
     treepieces_bake_desc bake = {0};
     treepieces_mesh *wood = NULL, *leaves = NULL;
     float *bones = malloc(tree->node_count * TREEPIECES_BONE * sizeof *bones);

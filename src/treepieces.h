@@ -527,9 +527,12 @@ TREEPIECES_API txm_status treepieces_bones(const treepieces_forest *forest,
 /* Wind: a mean speed, and gusts that travel with it across the land. */
 typedef struct treepieces_wind {
     float direction; /* radians from +x towards -z: where it blows to                             */
-    float speed;     /* metres per second, 0..100; bends by its square                            */
+    float speed;     /* metres per second, 0..100; bends by its square, above 15 m/s by less     */
     float gusts;     /* 0..1: how much the pressure varies; 0 = steady                            */
     uint32_t seed;
+    float period;    /* 0..10^6 seconds after which all of it repeats itself, so that animations can
+                        loop: a tree that sways for long in steps of a part of this does so too. 0 =
+                        never. With short periods the gusts are faster                            */
 } treepieces_wind;
 
 /* The pressure of the wind at a position and time (seconds), gusts included; 1 = that of 10 m/s. 0

@@ -28,7 +28,7 @@ int read_species(forest_gl *f) {
 
 /* Advance the wind to a time, in steps of 1/30 s at most (up to 10 s). */
 int advance_wind(forest_gl *f, double time) {
-    const treepieces_wind wind = {0.4f, f->o.wind, 0.7f, 7};
+    const treepieces_wind wind = {0.4f, f->o.wind, 0.7f, 7, 0};
     const double from = f->now;
     const int steps = txm_clampi((int)((time - from) * 30 + 0.999), 1, 300);
     for (int i = 1; i <= steps; i++)

@@ -31,6 +31,12 @@ static double tpc_sine_of_turns(double turns) {
     return sine;
 }
 
+/* The nearest rate, turns a second, at which the wind repeats itself after its period. */
+static double tpc_periodic(const treepieces_wind *wind, double rate) {
+    const double period = (double)wind->period, turns = floor(rate * period + 0.5);
+    return period > 0 ? (turns > 1 ? turns : 1) / period : rate;
+}
+
 /* Waves of 90, 41, 19 and 9 m that travel about in the direction and at the speed of the wind. */
 static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     static const double lengths[TPC_WAVES] = {90, 41, 19, 9};
@@ -41,7 +47,8 @@ static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
     air->direction[0] = txm_float(cosine);
     air->direction[1] = 0;
     air->direction[2] = txm_float(-sine);
-    air->pressure = wind->speed * wind->speed * 0.01f;
+    const float fast = wind->speed / 15; /* from there on crowns give way and offer less to the wind */
+    air->pressure = 0.0120185f * wind->speed * wind->speed / sqrtf(1 + fast * fast);
     air->gusts = wind->gusts;
     for (int i = 0; i < TPC_WAVES; i++) {
         tpc_wave *w = &air->waves[i];
@@ -50,6 +57,7 @@ static void tpc_make_waves(const treepieces_wind *wind, tpc_air *air) {
         w->along[0] = cosine / lengths[i];
         w->along[1] = -sine / lengths[i];
         w->rate = (double)wind->speed * (0.8 + 0.4 * (double)txm_rng_float(&rng)) / lengths[i];
+        w->rate = tpc_periodic(wind, w->rate);
         w->phase = (double)txm_rng_float(&rng);
         w->weight = weights[i];
     }
@@ -69,7 +77,7 @@ static float tpc_pressure(const tpc_air *air, const float position[3], double ti
 
 static int tpc_is_wind(const treepieces_wind *w) {
     return w && fabsf(w->direction) <= 1e4f && w->speed >= 0 && w->speed <= 100 && w->gusts >= 0 &&
-           w->gusts <= 1;
+           w->gusts <= 1 && w->period >= 0 && w->period <= 1e6f;
 }
 
 TREEPIECES_API float treepieces_gust(const treepieces_wind *wind, const float position[3],
@@ -102,10 +110,11 @@ static void tpc_make_classes(const treepieces_wind *wind, double dt, tpc_air *ai
         air->classes[c].vv = txm_float(e * (cosine - damping / part * sine));
         air->classes[c].give = txm_float(0.0055 * txm_exp2(0.6 * c));
         const double share = wind->gusts * (0.2 + 0.7 * (c < 4 ? c / 4.0 : 1));
+        const double slow = tpc_periodic(wind, frequency), fast = tpc_periodic(wind, 1.618 * frequency);
         for (int k = 0; k < TPC_PHASES; k++)
             air->classes[c].flutter[k] =
-                txm_float(share * (0.6 * tpc_sine_of_turns(frequency * air->time + k * 0.381966) +
-                                   0.4 * tpc_sine_of_turns(1.618 * frequency * air->time + k * 0.723607)));
+                txm_float(share * (0.6 * tpc_sine_of_turns(slow * air->time + k * 0.381966) +
+                                   0.4 * tpc_sine_of_turns(fast * air->time + k * 0.723607)));
     }
 }
 

@@ -95,7 +95,7 @@ static void test_rims_in_wind(void **state) {
     treepieces_forest_desc d = describe(1, 400);
     treepieces_forest *f = grow(&d);
     float *bones = make_bones(f, NULL), *sway = (float *)room(f->node_count, 16);
-    const treepieces_wind wind = {0.4f, 14, 0.8f, 3};
+    const treepieces_wind wind = {0.4f, 14, 0.8f, 3, 0};
     for (int i = 0; i < 20; i++) {
         assert_int_equal(treepieces_sway(f, &wind, i * 0.13, 0.13, NULL, NULL, sway, bones), TXM_OK);
         skinned s = skin_all(f, bones);
@@ -390,7 +390,7 @@ static void test_wind(void **state) {
     treepieces_forest *f = grow(&d);
     float *rest = make_bones(f, NULL), *lean = make_bones(f, NULL), *bones = make_bones(f, NULL);
     float *sway = (float *)room(f->node_count, 16);
-    treepieces_wind wind = {0, 10, 0, 1};
+    treepieces_wind wind = {0, 10, 0, 1, 0};
     assert_int_equal(treepieces_sway(f, &wind, 1e4, 1e4, NULL, NULL, sway, lean), TXM_OK);
     assert_true(farthest(rest, lean, f->node_count) > 0.02f);
     const float *tip = lean + 12 * (size_t)(f->trees[0].node_count - 1);
@@ -480,7 +480,7 @@ static void test_sway_has_scales(void **state) {
         const uint32_t nodes = f->node_count;
         float *rest = make_bones(f, NULL), *bones = make_bones(f, NULL);
         float *sway = (float *)room(nodes, 16), *way = (float *)room(nodes, STEPS * sizeof(float));
-        const treepieces_wind wind = {0, 8, 0.6f, 1};
+        const treepieces_wind wind = {0, 8, 0.6f, 1, 0};
         uint32_t top = 0;
         for (int i = -20 * RATE; i < STEPS; i++) {
             const double time = (double)i / RATE;
@@ -525,6 +525,41 @@ static void test_sway_has_scales(void **state) {
     }
 }
 
+/* A wind with a period repeats itself, and trees that sway for some time do so too. */
+static void test_period(void **state) {
+    (void)state;
+    enum { STEPS = 40, WARM = 12 };
+    treepieces_forest_desc d = describe(2, 200);
+    treepieces_forest *f = grow(&d);
+    float *first = make_bones(f, NULL), *bones = make_bones(f, NULL), *half = make_bones(f, NULL);
+    float *sway = (float *)room(f->node_count, 16);
+    const treepieces_wind wind = {0.3f, 9, 0.7f, 3, 4};
+    const float place[3] = {3, 0, -7};
+    for (int i = 0; i < 40; i++) {
+        const float gust = treepieces_gust(&wind, place, 0.1 * i);
+        assert_true(fabsf(gust - treepieces_gust(&wind, place, 0.1 * i + 4)) < 1e-5f);
+        assert_true(i == 0 || gust != treepieces_gust(&wind, place, 0.1 * (i - 1)));
+    }
+    for (int i = 0; i <= (WARM + 1) * STEPS; i++) {
+        assert_int_equal(treepieces_sway(f, &wind, 4.0 * i / STEPS, 4.0 / STEPS, NULL, NULL, sway, bones), TXM_OK);
+        const size_t bytes = f->node_count * TREEPIECES_BONE * sizeof(float);
+        if (i == WARM * STEPS) memcpy(first, bones, bytes);
+        if (i == WARM * STEPS + STEPS / 2) memcpy(half, bones, bytes);
+    }
+    assert_true(farthest(first, half, f->node_count) > 0.05f);
+    assert_true(farthest(first, bones, f->node_count) < 1e-4f);
+    treepieces_wind bad = wind;
+    bad.period = -1;
+    assert_int_equal(treepieces_sway(f, &bad, 0, 0, NULL, NULL, sway, bones), TXM_BAD_ARGUMENT);
+    bad.period = (float)NAN;
+    assert_int_equal(treepieces_sway(f, &bad, 0, 0, NULL, NULL, sway, bones), TXM_BAD_ARGUMENT);
+    free(sway);
+    free(half);
+    free(bones);
+    free(first);
+    treepieces_forest_free(f);
+}
+
 /* Trees of one seed in different places do not sway in unison: the correlation of their tops. */
 static void test_no_unison(void **state) {
     (void)state;
@@ -541,7 +576,7 @@ static void test_no_unison(void **state) {
     d.places = places;
     treepieces_forest *f = grow(&d);
     float *bones = make_bones(f, NULL), *sway = (float *)room(f->node_count, 16);
-    const treepieces_wind wind = {0, 8, 0.7f, 2};
+    const treepieces_wind wind = {0, 8, 0.7f, 2, 0};
     for (int s = -60; s < STEPS; s++) {
         assert_int_equal(treepieces_sway(f, &wind, s * 0.1, 0.1, NULL, NULL, sway, bones), TXM_OK);
         for (int i = 0; i < TREES && s >= 0; i++) {
@@ -574,7 +609,7 @@ static void test_no_unison(void **state) {
 /* Gusts travel with the wind: later they are downwind, a little changed. */
 static void test_gusts(void **state) {
     (void)state;
-    const treepieces_wind wind = {0, 10, 1, 4};
+    const treepieces_wind wind = {0, 10, 1, 4, 0};
     double here = 0, there = 0, still = 0;
     for (int i = 0; i < 400; i++) {
         const float x = 3.0f * (float)i, a[3] = {x, 0, 0}, b[3] = {x + 10, 0, 0};
@@ -644,7 +679,7 @@ static void test_arguments(void **state) {
     treepieces_forest_desc d = describe(1, 50);
     f = grow(&d);
     float *bones = make_bones(f, NULL), *sway = (float *)room(f->node_count, 16);
-    treepieces_wind wind = {0, 5, 0.5f, 0};
+    treepieces_wind wind = {0, 5, 0.5f, 0, 0};
     treepieces_pose pose;
     memset(&pose, 0, sizeof pose);
     pose.amount = -1;
@@ -710,7 +745,7 @@ int main(void) {
         cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
         cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
         cmocka_unit_test(test_memory),    cmocka_unit_test(test_scatter),
-        cmocka_unit_test(test_sway_has_scales),
+        cmocka_unit_test(test_sway_has_scales), cmocka_unit_test(test_period),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -80,7 +80,7 @@ int tree_read_species(tree_job *j) {
 /* ---- growing ------------------------------------------------------------------------------- */
 
 treepieces_wind tree_wind(const tree_job *j) {
-    treepieces_wind wind = {0, 0, 0.6f, 0};
+    treepieces_wind wind = {0, 0, 0.6f, 0, 0};
     wind.speed = (float)j->wind;
     wind.seed = (uint32_t)j->run.seed;
     return wind;

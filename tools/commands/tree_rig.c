@@ -112,70 +112,41 @@ static void make_joint(const tree_job *j, const tree_rig *rig, uint32_t node, me
 
 /* ---- the wind ------------------------------------------------------------------------------ */
 
-/* Store the joints' rotations of one moment as key `key` of lists of `stride` rotations each. Signs
-   are chosen nearest to `before`, or to the joint's own rotation if that is NULL. */
-static void store_turns(const tree_job *j, const tree_rig *rig, const float *bones, float *turns,
-                        size_t stride, size_t key, const float *before, size_t before_stride) {
+/* Store the joints' rotations of one moment as a key. Signs are chosen nearest to those of the key before,
+   or of the joints as they stand. */
+static void store_turns(const tree_job *j, const tree_rig *rig, const float *bones, int keys, int key) {
     for (uint32_t i = 0; i < j->forest->node_count; i++) {
         const int32_t parent = j->forest->nodes[i].parent;
         const size_t joint = rig->joint_of[i];
+        float *turn = rig->turns + 4 * (joint * (size_t)keys + (size_t)key);
+        const float *last = key ? turn - 4 : rig->joints[joint].rotation;
         if (!is_joint(j, rig, i)) continue;
         txm_quat local = tree_bone_rotation(bones + TREEPIECES_BONE * (size_t)i);
         if (parent >= 0)
             local = rotation_from(tree_bone_rotation(bones + TREEPIECES_BONE * (size_t)parent), local);
-        const float *last = rig->joints[joint].rotation;
-        if (before) last = before + 4 * joint * before_stride;
         const double dot = local.x * (double)last[0] + local.y * (double)last[1] +
                            local.z * (double)last[2] + local.w * (double)last[3];
-        store_rotation(turns + 4 * (joint * stride + key), local, dot < 0 ? -1 : 1);
+        store_rotation(turn, local, dot < 0 ? -1 : 1);
     }
 }
 
-/* Blend the last keys into those before the first, so that the animation loops seamlessly:
-
-       key K - blend + i  =  mix(itself, lead i, i / blend),  lead `blend` = key 0             */
-static void close_loop(const tree_rig *rig, const float *lead, int blend) {
-    const size_t keys = (size_t)rig->skeleton.key_count;
-    for (size_t joint = 0; joint < (size_t)rig->skeleton.joint_count; joint++) {
-        float *turns = rig->turns + 4 * keys * joint;
-        const float *from = lead + 4 * (size_t)(blend + 1) * joint;
-        for (int i = 0; i <= blend; i++) {
-            float *q = turns + 4 * (keys - 1 - (size_t)blend + (size_t)i);
-            const double t = (double)i / blend, s = t * t * (3 - 2 * t);
-            double mixed[4], length = 0;
-            for (int k = 0; k < 4; k++) {
-                mixed[k] = (1 - s) * (double)q[k] + s * (double)from[4 * i + k];
-                length += mixed[k] * mixed[k];
-            }
-            for (int k = 0; k < 4; k++) q[k] = (float)(mixed[k] / sqrt(length));
-        }
-        memcpy(turns + 4 * (keys - 1), turns, 4 * sizeof(float));
-    }
-}
-
-/* Simulate: first until the start no longer matters, then `blend` keys ahead, then the animation. */
-static int record(tree_job *j, tree_rig *rig, float *state, float *bones, float *lead, int blend) {
-    const treepieces_wind wind = tree_wind(j);
+/* Simulate in the steps of the keys: first until the start no longer matters, then the animation. Wind and
+   trees repeat themselves in its time, so that the last key is the first. */
+static int record(tree_job *j, tree_rig *rig, float *state, float *bones) {
+    treepieces_wind wind = tree_wind(j);
     const treepieces_pose pose = {j->run.seed, (float)j->pose, NULL};
-    const int keys = rig->skeleton.key_count;
-    const double step = 1.0 / j->rate, start = -(blend + 1) * step + 0.1;
+    const int keys = rig->skeleton.key_count, steps = keys - 1;
+    const double step = 1.0 / j->rate;
+    const int periods = (int)(0.1 * WARM_UP / (steps * step)) + 1;
     txm_status result = TXM_OK;
-    size_t key = 0; /* counted from the first of those ahead */
-    for (int i = WARM_UP; i > 0 && result == TXM_OK; i--)
-        result = treepieces_sway(j->forest, &wind, start - 0.1 * i, 0.1, &pose, &j->run.env, state,
-                                 bones);
-    for (int i = -blend; i < keys && result == TXM_OK; i++) {
-        result =
-            treepieces_sway(j->forest, &wind, i * step, step, &pose, &j->run.env, state, bones);
-        if (result != TXM_OK) break;
-        const size_t lead_stride = (size_t)blend + 1, place = key++;
-        if (i <= 0)
-            store_turns(j, rig, bones, lead, lead_stride, place,
-                        place ? lead + 4 * (place - 1) : NULL, lead_stride);
-        if (i >= 0)
-            store_turns(j, rig, bones, rig->turns, (size_t)keys, (size_t)i,
-                        i ? rig->turns + 4 * (size_t)(i - 1) : lead + 4 * place,
-                        i ? (size_t)keys : lead_stride);
+    wind.period = (float)(steps * step);
+    for (int i = -periods * steps + 1; i < steps && result == TXM_OK; i++) {
+        result = treepieces_sway(j->forest, &wind, i * step, step, &pose, &j->run.env, state, bones);
+        if (result == TXM_OK && i >= 0) store_turns(j, rig, bones, keys, i);
+    }
+    for (int i = 0; i < rig->skeleton.joint_count; i++) {
+        float *turns = rig->turns + 4 * (size_t)keys * (size_t)i;
+        memcpy(turns + 4 * steps, turns, 4 * sizeof(float));
     }
     return check_result(&j->run, result, j->species[0].name);
 }
@@ -183,28 +154,23 @@ static int record(tree_job *j, tree_rig *rig, float *state, float *bones, float 
 static int make_clip(tree_job *j, tree_rig *rig) {
     const size_t nodes = j->forest->node_count, joints = (size_t)rig->skeleton.joint_count;
     const int steps = (int)(j->seconds * j->rate + 0.5) > 2 ? (int)(j->seconds * j->rate + 0.5) : 2;
-    const int keys = steps + 1, blend = j->rate < steps / 2 ? j->rate : steps / 2;
+    const int keys = steps + 1;
     size_t all;
     if (!txm_mul((size_t)keys, joints, 4, &all)) return fail_memory(&j->run);
     float *state = (float *)new_array(nodes, 4 * sizeof(float));
     float *bones = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
-    float *lead = (float *)new_array(((size_t)blend + 1) * joints, 4 * sizeof(float));
     int status = CLI_DONE;
     rig->times = (float *)new_array((size_t)keys, sizeof(float));
     rig->turns = (float *)new_array(all, sizeof(float));
     rig->skeleton.key_count = keys;
     rig->skeleton.clip = "wind";
-    if (!state || !bones || !lead || !rig->times || !rig->turns) status = fail_memory(&j->run);
-    if (!status) status = record(j, rig, state, bones, lead, blend);
-    if (!status) {
-        for (int i = 0; i < keys; i++) rig->times[i] = (float)((double)i / j->rate);
-        close_loop(rig, lead, blend);
-    }
+    if (!state || !bones || !rig->times || !rig->turns) status = fail_memory(&j->run);
+    if (!status) status = record(j, rig, state, bones);
+    for (int i = 0; i < keys && !status; i++) rig->times[i] = (float)((double)i / j->rate);
     rig->skeleton.times = rig->times;
     rig->skeleton.turns = rig->turns;
     free(state);
     free(bones);
-    free(lead);
     return status;
 }
 

@@ -420,7 +420,8 @@ static void move(const treepieces_forest *f, float *bones, pool *p, source *s) {
     const size_t count = (size_t)f->node_count;
     float *state = (float *)(void *)take(p, 16 * count), *joints = (float *)(void *)take(p, 16 * count);
     treepieces_pose pose = {(uint64_t)pick(s, 256), pick(s, 8) ? unit(s) : odd_number(s), NULL};
-    treepieces_wind wind = {10 * unit(s), pick(s, 8) ? 100 * unit(s) * unit(s) : 100, pick(s, 3) ? unit(s) : 1, 7};
+    treepieces_wind wind = {10 * unit(s), pick(s, 8) ? 100 * unit(s) * unit(s) : 100, pick(s, 3) ? unit(s) : 1, 7,
+                            pick(s, 2) ? 0 : 30 * unit(s)};
     double time = pick(s, 20) ? 1000 * (double)unit(s) : (double)odd_number(s);
     txm_env env;
     memset(&env, 0, sizeof env);
@@ -430,6 +431,7 @@ static void move(const treepieces_forest *f, float *bones, pool *p, source *s) {
     if (pick(s, 30) == 0) wind.speed = odd_number(s);
     if (pick(s, 30) == 0) wind.gusts = odd_number(s);
     if (pick(s, 30) == 0) wind.direction = odd_number(s);
+    if (pick(s, 30) == 0) wind.period = odd_number(s);
     must(treepieces_bones(f, NULL, &env, bones) == TXM_OK && are_finite(bones, TREEPIECES_BONE * count));
     if (treepieces_bones(f, &pose, &env, bones) != TXM_OK) must(env.message[0]);
     else must(are_finite(bones, TREEPIECES_BONE * count));
@@ -667,7 +669,7 @@ static void impostor(pool *p, source *s) {
     for (int y = 0; y < height && done; y++)
         for (int x = 0; x < width; x++) {
             const float depth = txm_image_get(&out[1], x, y, 0), alpha = txm_image_get(&out[0], x, y, 3);
-            must(alpha == 0 ? depth == -2 : alpha == 1 && depth > -2 && depth < 3);
+            must(alpha == 0 ? depth == -2 : alpha == 1 && depth > -2 && depth < 9);
         }
     must(t.memory.blocks == 0);
     fuzz_succeeded += done;

@@ -133,7 +133,7 @@ static uint64_t rules(txm_env *env) {
 /* poses and wind, and the pieces as the bones bend them */
 static uint64_t wind(txm_env *env) {
     static float positions[3 * 4096], normals[3 * 4096];
-    const treepieces_wind blow = {0.3f, 9, 0.7f, 5};
+    const treepieces_wind blow = {0.3f, 9, 0.7f, 5, 0};
     const treepieces_pose pose = {6, 0.2f, NULL};
     treepieces_kit *kit = make_kit(env);
     read_species(1, env);
