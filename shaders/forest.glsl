@@ -72,22 +72,26 @@ float sun_at(vec3 place, float bias, float least, float most) {
     float deep = length(rows[2]), above = 0.0, count = 0.0;
     float turn = 6.283 * fract(52.983 * fract(dot(gl_FragCoord.xy, vec2(0.06711, 0.00584))));
     if (any(greaterThan(abs(at.xy - 0.5), vec2(0.5)))) return 1.0;
-    at.z -= bias * deep;
-    for (float k = 0.0; k < 6.0; k++) {
-        float angle = turn + 2.4 * k, far = most * sqrt((k + 0.5) / 6.0);
-        float depth = textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r;
-        if (depth < min(at.z, 1.0)) {
-            above += at.z - depth;
-            count++;
+    at.z = min(at.z - bias * deep, 1.0);
+    float soft = least, taps = 6.0, lit = 0.0;
+    if (least < most) { /* how far away is what casts shadows here? */
+        for (float k = 0.0; k < 6.0; k++) {
+            float angle = turn + 2.4 * k, far = most * sqrt((k + 0.5) / 6.0);
+            float depth = textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r;
+            if (depth < at.z) {
+                above += at.z - depth;
+                count++;
+            }
         }
+        if (count == 0.0) return 1.0;
+        soft = clamp(0.012 * above / (count * deep), least, most);
+        taps = 12.0;
     }
-    if (count == 0.0) return 1.0;
-    float soft = clamp(0.025 * above / (count * deep), least, most), lit = 0.0;
-    for (float k = 0.0; k < 12.0; k++) {
-        float angle = turn + 2.4 * k, far = soft * sqrt((k + 0.5) / 12.0);
-        lit += float(textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r >= min(at.z, 1.0));
+    for (float k = 0.0; k < taps; k++) {
+        float angle = turn + 2.4 * k, far = soft * sqrt((k + 0.5) / taps);
+        lit += float(textureLod(shadows, at.xy + far * size * vec2(cos(angle), sin(angle)), 0.0).r >= at.z);
     }
-    return lit / 12.0;
+    return lit / taps;
 }
 #endif
 
@@ -415,7 +419,7 @@ vec3 crown_normal(vec3 center, float radius) {
 /* The light that a leaf sends to the eye. n: the crown's surface, with some of the cloud's */
 vec3 leaf_light(vec3 place, vec3 n) {
     vec2 open = light_at(place + n * frame.box_low.w);
-    float sun = mix(sun_at(place, 0.12, 0.03, 0.2), open.r, 0.3);
+    float sun = mix(sun_at(place, 0.12, 0.1, 0.1), open.r, 0.3);
     float facing = clamp(0.30 + 0.70 * dot(n, frame.sun.xyz), 0.0, 1.0), skywards = 0.5 + 0.5 * n.y;
     /* a leaf lit from behind is brighter and yellower than one that reflects */
     float through = clamp(0.2 + 0.8 * dot(normalize(place - frame.eye.xyz), frame.sun.xyz), 0.0, 1.0);
@@ -584,7 +588,7 @@ void main() {
     vec3 litter = vec3(0.075, 0.056, 0.030);
     vec3 albedo = mix(litter, grass, smoothstep(0.35, 0.65, open.g + 0.5 * sum + 0.05));
     albedo *= max(1.0 + 1.1 * sum, 0.25);
-    float sun = sun_at(place, 0.03, 0.02, 0.5);
+    float sun = sun_at(place, 0.03, 0.02, 0.25);
     vec3 arriving = sun_color * frame.sun.y * sun * mix(0.75, 1.0, open.r) + sky_color * open.g;
     color = seen(albedo * arriving, place);
 }
