@@ -4,7 +4,7 @@
 # driver is enough for both.
 . tests/kit/tap.sh
 
-gl=$OUT/gl_treepieces forest=$PWD/build/examples/forest_gl
+gl=$OUT/gl_treepieces forest=$PWD/build/examples/forest_gl shaders=$PWD/shaders kit=$PWD/tests/kit
 if [ ! "$gl" -nt tests/look/gl_treepieces.c ] || [ -n "$(find examples/forest_gl -newer "$gl")" ] ||
     [ ! "$gl" -nt tests/kit/treekit.h ] || [ ! "$gl" -nt treepieces.h ] || [ ! "$gl" -nt texmath.h ]; then
     # shellcheck disable=SC2086 # flags are words
@@ -56,6 +56,41 @@ looks() {
 draw --headless a.png
 check "forest_gl: bare, levels in colours, time, wind, tessellation, other views" looks
 
+# brightness FILE X Y: of a pixel, 0..765
+brightness() {
+    python3 - "$@" "$kit" <<'END'
+import sys
+sys.path.insert(0, sys.argv[4])
+from png import Png
+p, x, y = Png(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+print(sum(p.lines[y][p.channels * x:p.channels * x + 3]))
+END
+}
+
+# from above; -z is up. The sun stands at x 0.53, z 0.58, so that shadows go to the upper left
+shadow() {
+    "$forest" --shaders "$shaders" --species dead --count 1 --size 200x200 --smooth 1 --orbit 0,89,24 \
+        --at 0,0,0 --wind 0 --headless s.png >out.log 2>err.log || { cat err.log; return 1; }
+    for step in 8 14; do # 2/3 m and more from the middle of the foot, still on the trunk's shadow
+        dark=$(brightness s.png $((100 - step)) $((100 - step))) || return 1
+        light=$(brightness s.png $((100 + step)) $((100 + step)))
+        [ $((10 * dark)) -lt $((7 * light)) ] || { echo "$step pixels from the foot: $dark, in the sun $light"; return 1; }
+    done
+}
+check "forest_gl: the shadow of a trunk begins at its foot" shadow
+
+near_leaves() {
+    for metres in 0 4; do
+        "$forest" --shaders "$shaders" --count 1 --pieces 400 --size 120x90 --smooth 1 --orbit 20,3,4 --at 2,5,1 \
+            --cards $metres --headless n$metres.png >out.log 2>err.log || { cat err.log; return 1; }
+        eval "calls$metres=$(value draws)"
+    done
+    # shellcheck disable=SC2154 # eval sets them
+    [ $((calls4 - calls0)) = 1 ] || { echo "$calls0 and $calls4 draw calls"; return 1; }
+    ! cmp -s n0.png n4.png
+}
+check "forest_gl: leaves near the camera are cards, with one draw call more" near_leaves
+
 frames() {
     draw --headless f%02d.png --frames 3 --wind 9 || { cat err.log; return 1; }
     [ -s f00.png ] && [ -s f02.png ] && [ ! -e f03.png ] && ! cmp -s f00.png f02.png
@@ -76,7 +111,7 @@ bad() {
     refuses "preset\|species" --species fern && refuses "cannot\|species" --species ./none.txt &&
         refuses "not a set of tiles" --bark . && refuses "cannot read" --leaf none.png &&
         refuses usage --count 0 && refuses usage --size 8 && refuses usage --orbit 1 &&
-        refuses usage --frames 2 && refuses usage --nonsense && refuses usage --count &&
+        refuses usage --frames 2 && refuses usage --nonsense && refuses usage --cards -1 && refuses usage --count &&
         refuses "cannot find" --shaders . && refuses usage --wind wet
 }
 check "forest_gl reports errors with a message" bad

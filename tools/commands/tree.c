@@ -103,7 +103,7 @@ static int append(tree_job *j, const treepieces_mesh *from, const float *color, 
     for (size_t i = 0; i < from->vertex_count && color; i++) {
         for (size_t k = 0; k < 3; k++)
             to->colors[4 * (base + i) + k] =
-                (unsigned char)(from->colors[4 * i + k] * txm_clampf(color[k], 0, 1) + 0.5f);
+                (unsigned char)((float)from->colors[4 * i + k] * txm_clampf(color[k], 0, 1) + 0.5f);
         to->colors[4 * (base + i) + 3] = 255;
     }
     to->vertex_count += from->vertex_count;
