@@ -242,6 +242,19 @@ species() {
 SPECIES
 }
 
+# moving NAME OPTIONS...: three seconds of wind as an animation without end, appended to the page; needs
+# img2webp
+moving() {
+    name=$1
+    shift
+    command -v img2webp >/dev/null || { echo "demo: no animation of $name: img2webp is not installed"; return 0; }
+    mkdir -p "$out/frames"
+    drawn "frames/$name-%02d.png" --count 1 --frames 24 --loop 3 --size 300x360 "$@"
+    img2webp -loop 0 -lossy -q 75 -d 125 "$out/frames/$name"-*.png -o "$out/$name.webp" >/dev/null
+    rm -rf "$out/frames"
+    printf '<img src="%s.webp" width="300" height="360" alt="%s, moving">\n' "$name" "$name" >>"$out/index.part"
+}
+
 # samples NAME...: samples for single sections, copied to the page; fails if one of them is not there
 samples() {
     for sample; do
@@ -645,8 +658,12 @@ SPECIES
 <p>Levels of detail by distance, from green for the coarsest to red for the finest: quads near the camera
 have more triangles, and quads that share an edge always agree on its level, so there are no cracks.</p>
 <img class="wide" src="levels.png" width="1200" height="500" alt="trees coloured by level of tessellation">
-<p>A birch in the wind, at intervals of 0.6 seconds.</p>
-<div class="frames">
+<p>A birch in a fresh breeze, and the same in a near gale, at intervals of 0.6 seconds. The trunk sways with the
+gusts, branches and twigs swing on their own, the faster the thinner they are.</p>
+<div class="frames" style="grid-template-columns: repeat(5, 1fr)">
+FOREST
+    moving birch --species birch --pieces 1200 --wind 8
+    cat >>"$out/index.part" <<'FOREST'
 <img src="wind-0.png" width="300" height="360" alt="a birch in the wind">
 <img src="wind-1.png" width="300" height="360" alt="0.6 seconds later">
 <img src="wind-2.png" width="300" height="360" alt="1.2 seconds later">

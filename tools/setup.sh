@@ -51,6 +51,9 @@ case $profile in demo | test | lint | ci)
     need has_header EGL/egl.h libegl-dev
     need has_header GL/glext.h libgl-dev
 esac
+case $profile in demo | ci)
+    want has_command img2webp webp # animations
+esac
 case $profile in demo | test | ci)
     need has_file "/usr/lib*/libOpenGL.so /usr/lib/*/libOpenGL.so" libopengl-dev
     need has_file "/usr/share/glvnd/egl_vendor.d/*mesa.json" libegl-mesa0

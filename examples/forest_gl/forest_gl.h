@@ -35,6 +35,7 @@ typedef struct options {
     int width, height, frames, smooth;
     uint64_t seed;
     double time;                /* seconds                                                      */
+    float loop;                 /* seconds in which the pictures repeat themselves; 0: never    */
     float wind, level, half;    /* m/s; of tessellation; metres over which it halves            */
     float cards;                /* metres from the camera up to which leaves are drawn as cards  */
     float orbit[3];             /* azimuth, elevation in degrees; distance in metres, 0: all of

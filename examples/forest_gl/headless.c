@@ -83,10 +83,11 @@ int render_pictures(forest_gl *f) {
     uint8_t *pixels = (uint8_t *)allocate(f, (size_t)width * (size_t)height, 4);
     uint8_t *rgb = (uint8_t *)allocate(f, (size_t)f->o.width * (size_t)f->o.height, 3);
     const GLuint target = make_target(width, height);
+    const double step = f->o.loop > 0 ? (double)f->o.loop / f->o.frames : 1 / 25.0;
     const double start = seconds();
     for (int i = 0; i < f->o.frames && pixels && rgb && !f->failed[0]; i++) {
         char path[1024];
-        if (i > 0 && !advance_wind(f, f->o.time + i / 25.0)) break;
+        if (i > 0 && !advance_wind(f, f->o.time + i * step)) break;
         upload_bones(f);
         if (i == 0) draw_shadows(f);
         draw_frame(f, target, width, height);

@@ -5,7 +5,7 @@
              [--bark DIR|SHEET.png] [--leaf PICTURE.png]
              [--time T] [--wind SPEED] [--level MAX] [--half METRES] [--wire]
              [--cards METRES] [--orbit AZIMUTH,ELEVATION,DISTANCE] [--at X,Y,Z] [--size WxH] [--shaders DIR]
-             [--headless OUT.png [--frames N] [--smooth N]]
+             [--headless OUT.png [--frames N [--loop SECONDS]] [--smooth N]]
 
    How a game uses treepieces.h and shaders/treepieces.glsl. The arrays of the forest are uploaded once,
    the bones once a frame. A frame is one instanced draw call for each type of piece, one for all leaf
@@ -15,7 +15,8 @@
 
    In the window: drag to turn, wheel to zoom, right button to move, w shows the levels of tessellation,
    l toggles the leaves, space pauses the wind, Esc quits. --headless needs neither a window nor a
-   graphics card; if OUT contains %d or %03d, it writes --frames pictures, 25 a second.
+   graphics card; if OUT contains %d or %03d, it writes --frames pictures, 25 a second,
+   or as many in the seconds of --loop, after which the first one follows on the last.
 
    --bark    a set of framed tiles from 'texkit tiles --kind frame', or a sheet of treepieces_bark
    --leaf    a picture with transparency, for all species
@@ -65,7 +66,7 @@ int main(int argc, char **argv) {
                 "  [--bare] [--bark DIR|SHEET.png] [--leaf PNG] [--time T] [--wind SPEED]\n"
                 "  [--level MAX] [--half METRES] [--wire] [--cards METRES] [--orbit AZIMUTH,ELEVATION,DISTANCE]\n"
                 "  [--at X,Y,Z] [--size WxH] [--shaders DIR]\n"
-                "  [--headless OUT.png [--frames N, with %%d in OUT] [--smooth N]]\n");
+                "  [--headless OUT.png [--frames N [--loop SECONDS], with %%d in OUT] [--smooth N]]\n");
         return 2;
     }
     if (read_species(&f) && grow_trees(&f) && make_pictures(&f)) {

@@ -45,6 +45,7 @@ int read_option(options *o, const char *name, const char *value) {
         else if (strcmp(name, "--frames") == 0) o->frames = (int)v[0];
         else if (strcmp(name, "--smooth") == 0) o->smooth = (int)v[0];
         else if (strcmp(name, "--time") == 0) o->time = (double)v[0];
+        else if (strcmp(name, "--loop") == 0) o->loop = v[0];
         else if (strcmp(name, "--wind") == 0) o->wind = v[0];
         else if (strcmp(name, "--level") == 0) o->level = v[0];
         else if (strcmp(name, "--half") == 0) o->half = v[0];
@@ -75,6 +76,6 @@ int options_are_valid(const options *o) {
     return o->count >= 1 && o->count <= 1000000 && o->frames >= 1 && o->frames <= 100000 &&
            o->width >= 16 && o->width <= 8192 && o->height >= 16 && o->height <= 8192 &&
            o->smooth >= 1 && o->smooth <= 4 && o->level >= 1 && o->level <= 64 && o->half > 0 &&
-           o->cards >= 0 &&
+           o->cards >= 0 && o->loop >= 0 && o->loop <= 60 && (o->loop == 0 || o->headless) &&
            (o->frames == 1 || !o->headless || strchr(o->headless, '%'));
 }

@@ -28,7 +28,7 @@ int read_species(forest_gl *f) {
 
 /* Advance the wind to a time, in steps of 1/30 s at most (up to 10 s). */
 int advance_wind(forest_gl *f, double time) {
-    const treepieces_wind wind = {0.4f, f->o.wind, 0.7f, 7, 0};
+    const treepieces_wind wind = {0.4f, f->o.wind, 0.7f, 7, f->o.loop};
     const double from = f->now;
     const int steps = txm_clampi((int)((time - from) * 30 + 0.999), 1, 300);
     for (int i = 1; i <= steps; i++)
@@ -67,8 +67,12 @@ int grow_trees(forest_gl *f) {
     f->bones = (float *)allocate(f, f->forest->node_count, TREEPIECES_BONE * sizeof(float));
     f->sway = (float *)allocate(f, f->forest->node_count, 4 * sizeof(float));
     if (!f->bones || !f->sway) return 0;
-    f->now = f->o.time - 10; /* the sway settles in 10 seconds */
-    if (!advance_wind(f, f->o.time)) return 0;
+    /* the sway settles in 10 seconds; where it is to repeat itself, in 30 and in the steps of the pictures */
+    const double step = f->o.loop > 0 ? (double)f->o.loop / f->o.frames : 10;
+    const int steps = f->o.loop > 0 ? (int)(30 / step) + 1 : 1;
+    f->now = f->o.time - steps * step;
+    for (int i = steps - 1; i >= 0; i--)
+        if (!advance_wind(f, f->o.time - i * step)) return 0;
     for (int k = 0; k < 3; k++) {
         f->low[k] = k == 1 ? 0 : 1e9f;
         f->high[k] = -1e9f;

@@ -29,6 +29,11 @@ static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4
     if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
 }
 
+/* An angle as it is where it is small, and below 0.12 radians in any wind. */
+static float tpc_soften(float angle) {
+    return angle / (1 + fabsf(angle) * (1 / 0.12f));
+}
+
 /* One time step of a joint: the wind in its frame (x and z across the stem) drives its oscillator. The
    two directions differ in phase, so that branches move round and round. */
 static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, float yield,
@@ -42,8 +47,8 @@ static void tpc_sway_joint(const tpc_air *air, const treepieces_node *n, float y
     const float strength = sqrtf(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2]);
     const float give = air->classes[mode].give * txm_clampf(yield * n->length, 0.1f, 3);
     /* equilibrium, leaning with the wind: towards +z about +x, towards +x about -z */
-    const float rest[2] = {txm_clampf(give * (w[2] + strength * flutter), -0.2f, 0.2f),
-                           txm_clampf(-give * (w[0] + strength * other), -0.2f, 0.2f)};
+    const float rest[2] = {tpc_soften(give * (w[2] + strength * flutter)),
+                           tpc_soften(-give * (w[0] + strength * other))};
     for (int k = 0; k < 2; k++) {
         const float x = state[2 * k] - rest[k], v = state[2 * k + 1];
         state[2 * k] = rest[k] + (air->classes[mode].xx * x + air->classes[mode].xv * v);

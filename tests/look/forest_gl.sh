@@ -97,6 +97,24 @@ frames() {
 }
 check "forest_gl: frames of an animation" frames
 
+# with --loop the picture after the last is the first: begun a picture later, the last is what the first
+# was, but for shadows, which stay as they are in the first
+loops() {
+    for begin in l:0 m:0.5; do
+        draw --headless "${begin%:*}%d.png" --time "${begin#*:}" --frames 4 --loop 2 --wind 9 --bare \
+            --at 0,7,0 --orbit 0,5,30 || { cat err.log; return 1; }
+    done
+    PYTHONPATH=$kit /usr/bin/python3 -c '
+from png import Png, need
+def difference(a, b):
+    rows = [b"".join(bytes(r) for r in Png(f).lines) for f in (a, b)]
+    return sum(abs(x - y) for x, y in zip(*rows)) / len(rows[0])
+for k in range(4):
+    a, b, c = "l%d.png" % k, "l%d.png" % ((k + 1) % 4), "m%d.png" % k
+    need(difference(b, c) < 0.5 * difference(a, b), b, "and", c, "differ, or nothing moves from", a)'
+}
+check "forest_gl: --loop" loops
+
 # on a virtual screen; SDL treats the signal like a click on the close button of the window
 window() {
     xvfb-run -a -s "-screen 0 640x480x24" sh -c '"$0" --size 160x120 --pieces 8 >out.log 2>err.log &
