@@ -3,7 +3,7 @@
 # SPDX-License-Identifier: MIT OR Unlicense
 #
 # KIND is
-#   skin     a GLB with a skeleton. Reads it by itself, does the skinning itself: weights, hierarchy,
+#   skin     a GLB with a skeleton; bones=FILE is what tests/tool/sway_bones.c printed of the same tree. Reads it by itself, does the skinning itself: weights, hierarchy,
 #            inverse bind matrices, the welded bark (see obj), the clip: keys without jumps, the last
 #            like the first, vertices finite and within reach at several times
 #   forest   a GLB of copies: instanced nodes, their attributes
@@ -184,6 +184,11 @@ class Tree(Glb):
 
     def pose(self, time=None):
         """Skin matrices, of the joints as they stand or at a time of the clip."""
+        world = self.place(time)
+        return [product(world[j], b) for j, b in zip(self.joints, self.bind)]
+
+    def place(self, time=None):
+        """Where the joints are, each a matrix."""
         world = {}
 
         def place(i):
@@ -206,7 +211,7 @@ class Tree(Glb):
             stack += self.nodes[i].get("children", [])
         for i in order:
             place(i)
-        return [product(world[j], b) for j, b in zip(self.joints, self.bind)]
+        return world
 
 
 def skinned(positions, joints, weights, pose):
@@ -222,6 +227,29 @@ def skinned(positions, joints, weights, pose):
     return out
 
 
+def check_bones(tree, path):
+    """Are the joints at the times of some keys where the library alone says that the bones are? A sample
+    for other programs to compare."""
+    with open(path) as f:
+        told = json.load(f)
+    size = max(abs(m[0][k]) for m in told["pieces"] for k in (3, 7, 11))
+    names = {j: int(tree.nodes[j]["name"].split()[-1]) for j in tree.joints}
+    moved = 0
+    for which, time in enumerate(told["times"]):
+        world = tree.place(time)
+        for j, number in names.items():
+            want = told["pieces"][number][which]
+            for r in range(3):
+                for c in range(4):
+                    need(abs(world[j][r][c] - want[4 * r + c]) < 2e-3 * (size if c == 3 else 1),
+                         "joint %d is not where the library has it" % number)
+            moved = max(moved, abs(want[3] - told["pieces"][number][0][3]))
+    need(moved > 0.01 * size, "nothing moves")
+    step = max(1, len(names) // SAMPLES)
+    return {"times": told["times"], "size": size,
+            "pieces": {n: told["pieces"][n] for n in sorted(names.values())[::step]}}
+
+
 def check_skin(path, want):
     tree = Tree(path)
     g = tree.json
@@ -234,6 +262,8 @@ def check_skin(path, want):
         expect["times"] = [0.37 * tree.times[-1], 0.71 * tree.times[-1]]
         tree.check_keys()
     poses = [tree.pose(t) for t in expect.get("times", [])]
+    if "bones" in want:
+        expect["bones"] = check_bones(tree, want.pop("bones"))
     for number, p in enumerate(tree.primitives):
         at = p["attributes"]
         for name in ("POSITION", "NORMAL", "TEXCOORD_0", "JOINTS_0", "WEIGHTS_0"):

@@ -3,7 +3,8 @@
 //
 // MODULES is the node_modules folder that holds three and puppeteer-core. Beside each FILE.glb lies
 // FILE.json, which tests/tool/check_tree.py wrote: how many joints, vertices and copies there are, and where
-// some of the vertices are at two times of the clip. Prints "ok - FILE" or "not ok - FILE" and what is
+// some of the vertices are at two times of the clip; of some trees also where the library has the bones at
+// times of the clip; or boxes of plain nodes. Prints "ok - FILE" or "not ok - FILE" and what is
 // wrong; the last line counts.
 const fs = require("fs");
 const http = require("http");
@@ -12,6 +13,7 @@ const path = require("path");
 const [modules, ...files] = process.argv.slice(2);
 const puppeteer = require(path.resolve(modules, "puppeteer-core"));
 const TOLERANCE = 1e-4; // of the size of the tree
+const BONE_TOLERANCE = 2e-3; // of the size of the tree; of a unit vector
 
 const PAGE = `<!DOCTYPE html><script type="importmap">{"imports": {
   "three": "/modules/three/build/three.module.js", "three/addons/": "/modules/three/examples/jsm/"}}
@@ -19,7 +21,9 @@ const PAGE = `<!DOCTYPE html><script type="importmap">{"imports": {
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 
-window.look = async (number, times, samples) => {
+const rows = m => [0, 1, 2].flatMap(r => [0, 1, 2, 3].map(c => m.elements[4 * c + r]));
+
+window.look = async (number, times, samples, boneTimes) => {
   const gltf = await new GLTFLoader().loadAsync("/file/" + number);
   const skinned = [], instanced = [];
   gltf.scene.traverse(o => {
@@ -32,10 +36,24 @@ window.look = async (number, times, samples) => {
   for (const m of skinned)
     found.primitives.push({ vertices: m.geometry.attributes.position.count,
                             triangles: m.geometry.index.count / 3, at: [] });
+  found.boxes = {};
+  gltf.scene.updateMatrixWorld(true);
+  if (!skinned.length && !instanced.length) for (const o of gltf.scene.children) {
+    const box = new THREE.Box3().setFromObject(o, true); // of the vertices
+    found.boxes[o.name] = [box.min.toArray(), box.max.toArray()];
+  }
+  found.bones = [];
   if (gltf.animations.length) {
     found.seconds = gltf.animations[0].duration;
     const mixer = new THREE.AnimationMixer(gltf.scene), v = new THREE.Vector3();
     mixer.clipAction(gltf.animations[0]).play();
+    for (const time of boneTimes) {
+      mixer.setTime(time);
+      gltf.scene.updateMatrixWorld(true);
+      const at = {}; // by number of the piece, with which the name ends
+      for (const b of skinned[0].skeleton.bones) at[b.name.match(/[0-9]+$/)[0]] = rows(b.matrixWorld);
+      found.bones.push(at);
+    }
     for (const time of times) {
       mixer.setTime(time);
       gltf.scene.updateMatrixWorld(true);
@@ -77,6 +95,20 @@ function compare(want, found) {
       size = Math.max(size, ...point.map(Math.abs));
     }));
   });
+  for (const [piece, matrices] of Object.entries((want.bones || { pieces: {} }).pieces))
+    matrices.forEach((m, time) => {
+      const at = found.bones[time][piece] || [];
+      m.forEach((x, k) => {
+        const off = Math.abs(x - at[k]) / (k % 4 === 3 ? want.bones.size : 1);
+        if (!(off < BONE_TOLERANCE)) wrong.push("bone " + piece + " is " + off + " away");
+      });
+    });
+  for (const n of want.placed || []) {
+    const corners = (found.boxes[n.name] || []).flat(), wanted = n.box.flat();
+    if (!corners.length || !wanted.every((x, k) => Math.abs(x - corners[k]) < TOLERANCE * wanted[4]))
+      wrong.push(n.name + " is missing or elsewhere");
+  }
+  if (want.placed) same("nodes", want.placed.length, Object.keys(found.boxes).length);
   if (!(worst <= TOLERANCE * size)) wrong.push("vertices up to " + worst + " from where they should be");
   return { wrong, worst };
 }
@@ -94,7 +126,8 @@ async function main() {
   for (let i = 0; i < files.length; i++) {
     const want = JSON.parse(fs.readFileSync(files[i].replace(/\.glb$/, ".json")));
     const samples = (want.primitives || []).map(p => p.samples.map(s => s.index));
-    const found = await page.evaluate((n, t, s) => window.look(n, t, s), i, want.times || [], samples);
+    const found = await page.evaluate((n, t, s, b) => window.look(n, t, s, b), i, want.times || [], samples,
+                                      want.bones ? want.bones.times : []);
     const { wrong, worst } = compare(want, found);
     if (wrong.length) failed++;
     else passed++;

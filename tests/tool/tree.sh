@@ -81,6 +81,20 @@ if has assimp; then
     done
 fi
 
+# the clip, joint by joint, as the library moves the bones
+sway=$root/$OUT/sway_bones
+# shellcheck disable=SC2086 # flags are words
+check "sway_bones builds" $CC -std=gnu99 $SANITIZE -ffp-contract=off -I"$root" -DTREEPIECES_IMPLEMENTED \
+    "$root/tests/tool/sway_bones.c" "$root/$OUT/modules/treepieces.o" -o "$sway" -lm
+for name in oak birch spruce; do
+    "$sway" $name 120 5 9 3 8 >bones.json
+    check "$name in the wind" run 0 tree -o sways-$name.glb --species $name --pieces 120 --sheet 128 --seed 5 \
+        --wind 9 --seconds 3 --rate 8
+    check "moves as the library moves it" $check_tree skin sways-$name.glb keys=25 bones=bones.json \
+        expect=sways-$name.json
+    keep sways-$name.glb sways-$name.json
+done
+
 rm -f ./*.glb ./*.assimp.json
 
 # ---- baked
