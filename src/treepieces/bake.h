@@ -414,7 +414,7 @@ TREEPIECES_API txm_status treepieces_bake(const treepieces_bake_desc *desc, txm_
 typedef struct tpc_placed_cloud {
     float center[3], radius;
     float sine, cosine;
-    float crown[3]; /* the middle of the crown */
+    float crown[3]; /* a point below the middle of the crown, from which its surface is seen */
     uint32_t joint;
     uint8_t color[4];
 } tpc_placed_cloud;
@@ -439,6 +439,7 @@ static void tpc_place_cloud(const treepieces_cluster *c, const float *bones, uin
     cloud->sine = txm_float(sine);
     cloud->cosine = txm_float(cosine);
     memcpy(cloud->crown, crown->middle, sizeof cloud->crown);
+    cloud->crown[1] -= 0.5f * crown->reach[1];
     cloud->joint = c->node - first_node;
     /* darker inside; lighter or darker, yellower or bluer at random */
     for (int k = 0; k < 3; k++) off[k] = (cloud->center[k] - crown->middle[k]) / crown->reach[k];
@@ -458,27 +459,32 @@ static void tpc_turn_cloud(const tpc_placed_cloud *cloud, const float v[3], floa
 }
 
 /* Write card number `index` of the mesh. Its normal is bent outwards, so that light runs round the
-   crown and not round each cloud; its front is turned there, mirrored if need be, as renderers turn
-   the normals of backs round. */
+   crown and not round each cloud; its front is turned to those who
+   look at the tree, mirrored if need be, as renderers turn the normals of backs round. */
 static void tpc_bake_card(treepieces_mesh *m, size_t index, const treepieces_card *card,
                           const tpc_placed_cloud *cloud) {
     static const float sides[4][2] = {{-1, 1}, {-1, -1}, {1, -1}, {1, 1}}; /* nw, sw, se, ne */
     static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
-    float center[3], right[3], up[3], own[3], normal[3], face[3];
+    float center[3], right[3], up[3], normal[3], face[3];
     tpc_turn_cloud(cloud, card->center, center);
     tpc_turn_cloud(cloud, card->right, right);
     tpc_turn_cloud(cloud, card->up, up);
-    tpc_turn_cloud(cloud, card->normal, own);
     for (int a = 0; a < 3; a++) {
         center[a] = cloud->center[a] + cloud->radius * center[a];
         normal[a] = center[a] - cloud->crown[a];
     }
-    tpc_unit_or(normal, own[0], own[1], own[2]);
-    for (int a = 0; a < 3; a++) normal[a] = 0.8f * normal[a] + 0.6f * own[a];
-    tpc_unit_or(normal, own[0], own[1], own[2]);
+    const float aside[3] = {normal[0], 0.1f * normal[1], normal[2]}; /* most are seen from there */
+    tpc_unit_or(normal, 0, 1, 0);
     tpc_cross(right, up, face);
-    if (tpc_dot(face, normal) < 0)
-        for (int k = 0; k < 3; k++) right[k] = -right[k];
+    tpc_unit_or(face, 0, 1, 0);
+    if (tpc_dot(face, aside) < 0) {
+        for (int k = 0; k < 3; k++) {
+            right[k] = -right[k];
+            face[k] = -face[k];
+        }
+    }
+    for (int a = 0; a < 3; a++) normal[a] = 0.8f * normal[a] + 0.4f * face[a];
+    tpc_unit_or(normal, 0, 1, 0);
     for (size_t k = 0; k < 4; k++) {
         const size_t vertex = 4 * index + k;
         for (size_t a = 0; a < 3; a++) {

@@ -600,29 +600,31 @@ static void turn_about(const treepieces_cluster *cluster, const float v[3], floa
     out[2] = (float)(cos(angle) * (double)v[2] - sin(angle) * (double)v[0]);
 }
 
-/* Card `card` of the cluster, as vertices 4 i.. of the mesh; crown: the mean of the clusters. */
+/* Card `card` of the cluster, as vertices 4 i.. of the mesh; crown: below the middle of the
+   clusters by half of what they reach up and down. */
 static void check_baked(const grown *g, const treepieces_tree *tree, const double crown[3],
                         const treepieces_cluster *cluster, const treepieces_card *card,
                         const treepieces_mesh *m, size_t i) {
     const float *bone = g->bones + TREEPIECES_BONE * (size_t)cluster->node;
-    float middle[3], right[3], up[3], own[3], outward[3], normal[3], size = 0;
+    float middle[3], right[3], up[3], outward[3], normal[3], size = 0;
     int seen = 0;
     turn_about(cluster, card->center, middle);
     turn_about(cluster, card->right, right);
     turn_about(cluster, card->up, up);
-    turn_about(cluster, card->normal, own);
     for (int a = 0; a < 3; a++) {
         const float at = bone[4 * a + 3] + cluster->along * bone[4 * a + 1] + cluster->radius * middle[a];
         outward[a] = at - (float)crown[a];
     }
+    /* the front is turned away from the trunk */
+    const float aside[3] = {outward[0], 0.1f * outward[1], outward[2]};
+    float face[3] = {right[1] * up[2] - right[2] * up[1], right[2] * up[0] - right[0] * up[2],
+                     right[0] * up[1] - right[1] * up[0]};
+    const float side = dot(face, aside) < 0 ? -1 : 1, area = sqrtf(dot(face, face));
+    for (int a = 0; a < 3; a++) right[a] *= side;
     for (int a = 0; a < 3; a++)
-        normal[a] = 0.8f * outward[a] / sqrtf(dot(outward, outward)) + 0.6f * own[a];
+        normal[a] = 0.8f * outward[a] / sqrtf(dot(outward, outward)) + 0.4f * side * face[a] / area;
     size = sqrtf(dot(normal, normal));
     for (int a = 0; a < 3; a++) normal[a] /= size;
-    /* the front is where the normal points */
-    const float face[3] = {right[1] * up[2] - right[2] * up[1], right[2] * up[0] - right[0] * up[2],
-                           right[0] * up[1] - right[1] * up[0]};
-    for (int a = 0; a < 3 && dot(face, normal) < 0; a++) right[a] = -right[a];
     for (size_t v = 4 * i; v < 4 * i + 4; v++) {
         assert_int_equal(m->joints[4 * v], cluster->node - tree->first_node);
         assert_true(m->weights[4 * v] == 1);
@@ -660,13 +662,17 @@ static void test_bake_leaves(void **state) {
                          TXM_OK);
         assert_int_equal(m->vertex_count, 4 * (size_t)oak.leaf_count * t->cluster_count);
         assert_int_equal(m->triangle_count, 2 * (size_t)oak.leaf_count * t->cluster_count);
-        double crown[3] = {0, 0, 0};
+        double crown[3] = {0, 0, 0}, square = 0; /* of heights */
         for (uint32_t i = 0; i < t->cluster_count; i++) {
             const treepieces_cluster *c = &g.forest->clusters[t->first_cluster + i];
             const float *bone = g.bones + TREEPIECES_BONE * (size_t)c->node;
-            for (int a = 0; a < 3; a++)
-                crown[a] += (double)(bone[4 * a + 3] + c->along * bone[4 * a + 1]) / t->cluster_count;
+            for (int a = 0; a < 3; a++) {
+                const double at = (double)(bone[4 * a + 3] + c->along * bone[4 * a + 1]);
+                crown[a] += at / t->cluster_count;
+                square += a == 1 ? at * at / t->cluster_count : 0;
+            }
         }
+        crown[1] -= 0.5 * (1.9 * sqrt(square - crown[1] * crown[1]) + 0.01);
         for (uint32_t i = 0; i < t->cluster_count; i++) {
             const treepieces_cluster *cluster = &g.forest->clusters[t->first_cluster + i];
             const int count =
