@@ -194,6 +194,23 @@ static void test_leaves(void **state) {
     for (int shape = 0; shape < SHAPES; shape++) free(shapes[shape].pixels);
 }
 
+/* Strips are several shoots side by side, all other sprays grow from one stem. Needles do not hang. */
+static void test_strips(void **state) {
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        treepieces_species s = shaped(i == 2 ? TREEPIECES_LEAF_NEEDLE : TREEPIECES_LEAF_LANCE);
+        txm_image image = make_image(2 * SIDE, 2 * SIDE, 4, TXM_U8);
+        int stems = 0;
+        s.cloud_kind = i ? TREEPIECES_CLOUD_STRIPS : TREEPIECES_CLOUD_ROUND;
+        assert_int_equal(treepieces_draw_leaves(&s, 5, NULL, image), TXM_OK);
+        for (int x = 1; x < 2 * SIDE; x++) /* that begin in the lowest row */
+            stems += rgba(&image, x, 2 * SIDE - 1)[3] > 99 && rgba(&image, x - 1, 2 * SIDE - 1)[3] <= 99;
+        if (i == 1) assert_in_range(stems, 5, 7);
+        else assert_int_equal(stems, 1);
+        free(image.pixels);
+    }
+}
+
 /* The same bytes with threads and with any stride; others with another seed. */
 static void test_leaves_repeat(void **state) {
     (void)state;
@@ -787,7 +804,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cloud),           cmocka_unit_test(test_looks),
         cmocka_unit_test(test_cloud_spread),    cmocka_unit_test(test_cloud_kinds),
-        cmocka_unit_test(test_leaves),
+        cmocka_unit_test(test_leaves),          cmocka_unit_test(test_strips),
         cmocka_unit_test(test_leaves_repeat),   cmocka_unit_test(test_leaves_sizes),
         cmocka_unit_test(test_leaves_refusals), cmocka_unit_test(test_impostor),
         cmocka_unit_test(test_impostor_behind), cmocka_unit_test(test_impostor_card),
