@@ -109,7 +109,7 @@
    LIMITS
      Up to 3 leaf rims, 255 vertices and 255 quads per piece, 16 kinds of pieces, 65,535 pieces per
      tree, 2^31 per forest. Branches keep apart at rest; in the wind they may pass through
-     each other. Wind bends joints; leaves do not move on their own. A stem bends by at most 60
+     each other. Wind bends joints; leaves move only with their twigs. A stem bends by at most 60
      degrees from one piece to the next.
 
    REFERENCES

@@ -27,6 +27,7 @@ layout(std140, binding = 0) uniform frame_block {
     vec4 box_low; /* lower corner of the texture of light; w: size of its cells */
     vec4 box_scale; /* 1 / its size; w: density of the fog, 1 / m */
     vec4 lod;     /* maximum level, half distance, shape of Phong tessellation, pixels of the sheet */
+    vec4 shimmer; /* of leaves: two phases in turns, strength 0 to 1 */
 } frame;
 
 /* a word per node: bits 0 to 3 the species, 4 to 7 its kind of bark, above a random number per tree */
@@ -402,6 +403,12 @@ vec3 tint_of(uint look, uint cloud) {
            (1.0 + 0.20 * bright + 0.20 * own);
 }
 
+/* Leaves shimmer faster than twigs sway: -1 to 1 each across and along, other ones for each phase, turns */
+vec2 shimmer_at(float phase) {
+    vec2 turns = 6.2832 * (frame.shimmer.xy + vec2(phase, 1.7 * phase));
+    return frame.shimmer.z * vec2(0.6 * sin(turns.x) + 0.4 * sin(turns.y), 0.6 * cos(turns.x) - 0.4 * sin(turns.y));
+}
+
 /* The normal of the crown's surface, as the light from the sky has it: towards where there is more;
    shorter where that is not clear. */
 vec3 crown_normal(vec3 center, float radius) {
@@ -445,6 +452,7 @@ out vec2 at;
 flat out vec4 sphere;
 flat out int layer;
 flat out vec3 tint, crown;
+flat out vec2 flutter;
 
 void main() {
     uvec4 c = clusters[gl_InstanceID];
@@ -452,6 +460,8 @@ void main() {
     uint look = looks[c.x], clouds = uint(frame.forward.w);
     vec3 center = treepieces_move_point(c.x, vec3(0.0, along, 0.0));
     at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+    flutter = shimmer_at(float(c.w >> 24) / 256.0);
+    center += 0.03 * radius * (flutter.x * frame.right.xyz + flutter.y * frame.up.xyz);
     sphere = vec4(center, radius);
     layer = int((look & 15u) * clouds + c.w % clouds);
     tint = tint_of(look, c.w);
@@ -466,12 +476,15 @@ in vec2 at;
 flat in vec4 sphere;
 flat in int layer;
 flat in vec3 tint, crown;
+flat in vec2 flutter;
 #ifndef SHADOW
 out vec4 color;
 #endif
 
 void main() {
-    vec3 texel = vec3(at * 0.5 + 0.5, layer);
+    /* the leaves of a cloud move against each other, less at its rim */
+    vec2 shift = 0.02 * (1.0 - dot(at, at)) * (flutter.x * sin(9.0 * at.yx) + flutter.y * cos(7.0 * at.yx));
+    vec3 texel = vec3((dot(at, at) < 1.0 ? at + shift : at) * 0.5 + 0.5, layer);
     vec4 leaf = texture(impostors, texel);
     float small = max(textureQueryLod(impostors, texel.xy).y, 0.0);
     if (leaf.a * (1.0 + 0.25 * small) < 0.4 || shows_cards(sphere.xyz)) discard;
@@ -506,6 +519,9 @@ void main() {
     vec2 side = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
     center = treepieces_move_point(c.x, vec3(0.0, along, 0.0));
     vec3 at = card.center.xyz + side.x * card.right.xyz + side.y * card.up.xyz;
+    vec2 flutter = shimmer_at(float(c.w >> 24) / 256.0 + 0.37 * float(near[gl_InstanceID].y));
+    at += 0.25 * length(card.up.xyz) * (0.5 + 0.5 * side.y) * /* it hangs on its twig below */
+          (flutter.x * card.normal.xyz + 0.4 * flutter.y * normalize(card.right.xyz));
     place = center + radius * at;
     leaf = vec2(side.x, -side.y) * 0.5 + 0.5;
     species = int(card.right.w);

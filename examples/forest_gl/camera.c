@@ -14,6 +14,13 @@ void choose_view(forest_gl *f) {
     f->o.orbit[2] = 0.53f * txm_maxf(tall / tan_up, wide / tan_right) + 0.2f * wide;
 }
 
+/* A phase of something that happens so many times a second; with --loop, so that it ends where it began. */
+static float phase_of(const forest_gl *f, double rate) {
+    const double loop = (double)f->o.loop;
+    const double turns = (loop > 0 ? floor(rate * loop + 0.5) / loop : rate) * f->now;
+    return (float)(turns - floor(turns));
+}
+
 /* The uniform block of a frame: the camera orbits o.at. */
 void aim_camera(forest_gl *f, int width, int height) {
     frame_data *d = &f->frame;
@@ -40,6 +47,9 @@ void aim_camera(forest_gl *f, int width, int height) {
     d->lod[1] = f->o.half;
     d->lod[2] = 0.6f;
     d->lod[3] = (float)f->sheets[0].width;
+    d->shimmer[0] = phase_of(f, 2.9);
+    d->shimmer[1] = phase_of(f, 4.7);
+    d->shimmer[2] = txm_minf(f->o.wind / 10, 1);
     f->near_plane = txm_clampf(0.02f * distance, 0.05f, 1);
     f->far_plane = distance + 4 * (wide + f->high[1]) + 500;
     const float n = f->near_plane, far = f->far_plane;

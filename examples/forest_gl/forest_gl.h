@@ -49,6 +49,7 @@ typedef struct frame_data {
     float view_projection[16]; /* column-major                                                  */
     float sun_projection[16];  /* of the picture of shadows                                     */
     float eye[4], right[4], up[4], forward[4], sun[4], box_low[4], box_scale[4], lod[4];
+    float shimmer[4];
 } frame_data;
 
 /* A type of piece, as treepieces.glsl reads it. */

@@ -97,6 +97,12 @@ frames() {
 }
 check "forest_gl: frames of an animation" frames
 
+still() {
+    for time in 0 0.13; do draw --headless "s$time.png" --wind 0 --time $time || { cat err.log; return 1; }; done
+    cmp s0.png s0.13.png
+}
+check "forest_gl: without wind neither wood nor leaves move" still
+
 # with --loop the picture after the last is the first: begun a picture later, the last is what the first
 # was, but for shadows, which stay as they are in the first
 loops() {
