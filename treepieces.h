@@ -73,8 +73,10 @@
      pose opens a gap or shows a crease. A child can be attached in six rotations. Each piece has
      one bone of its own, which scales it across and along the stem; its leaf rims follow the bones
      of its children, all in one buffer [1, 4.1 to 4.3].
-     Open rims get their pieces in order of decreasing radius, so that a limit on the number of
-     pieces thins out the twigs and keeps the shape of the tree: this is the coarse level of detail.
+     A tree is sketched axis by axis, the longest and outermost first, each to its end, until a limit on
+     the number of pieces is reached; then pieces are made of the sketch. Where a branch was not reached a
+     fork is a tube, and in trees of few pieces tubes in a row become one. So trees of any limit have one
+     skeleton, of which small ones lack the twigs: this is the coarse level of detail.
      The fine one is tessellation by distance, symmetric along each edge [1, 4.4]. Wind is a sum of
      gusts that travel across the land; each joint responds as a damped oscillator, solved exactly
      over each time step. The joints of an axis swing together: the trunk with the gusts, about 3
@@ -88,11 +90,12 @@
 
    MEMORY
      A forest takes about 60 bytes per piece; bones and sway state, which the caller owns, take 64
-     more: 20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. Growing takes 400
-     more bytes for each piece of the 64 trees that grow at a time, which are released afterwards.
+     more: 20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. Growing takes up to 1,500
+     more bytes for each piece of the 64 trees that grow at a time, 4,000 with few pieces, which are
+     released afterwards.
 
    TIME   (one core of 2023; make bench measures yours)
-     About 0.4 microseconds to grow a piece that keeps clear of others, 0.15 without clearance, if the
+     About 0.5 microseconds to grow a piece that keeps clear of others, 0.35 without clearance, if the
      memory was in use before (first access to fresh memory takes as long again), 0.06 to move its bone in the wind. The parallel-for hook
      distributes trees.
 
@@ -416,8 +419,8 @@ typedef struct treepieces_forest_desc {
                                        with random species and sizes                              */
     int tree_count;
     float spacing;  /* of that grid, metres; 0 = 0.6 times the trunk length of the tallest species */
-    int max_pieces; /* per tree, 8..65535; 0 = 600. The thickest grow first, so that fewer pieces
-                       make a sparser tree of the same shape                                      */
+    int max_pieces; /* per tree, 8..65535; 0 = 600. The most important axes grow first: trees of
+                       the same seed and fewer pieces are sparser, with the same height and shape */
     int rule;       /* treepieces_rule                                                            */
     treepieces_rule_function *own_rule; /* NULL, or called for each open rim                      */
     void *own_user; /* its first argument                                                         */
@@ -2355,8 +2358,19 @@ enum {
 typedef struct tpc_limb {
     float from[3], to[3];
     float radius, end; /* at its ends, metres */
-    int32_t parent;    /* of its node         */
+    int32_t parent;    /* of its segment      */
+    float middle[3], half; /* half its length */
 } tpc_limb;
+
+/* Set the middle of a limb and half its length. */
+static void tpc_limb_measure(tpc_limb *limb) {
+    float half[3];
+    for (int k = 0; k < 3; k++) {
+        half[k] = 0.5f * (limb->to[k] - limb->from[k]);
+        limb->middle[k] = limb->from[k] + half[k];
+    }
+    limb->half = sqrtf(tpc_dot(half, half));
+}
 
 /* A stem in a cell. */
 typedef struct tpc_entry {
@@ -2467,11 +2481,6 @@ static float tpc_nearest(const tpc_limb *a, const tpc_limb *b, float *along_a, f
 /* Do the stems come nearer to each other than `clearance` times the sum of their radii there? along:
    receives how far along the axis of `a`, metres. */
 static int tpc_limbs_touch(const tpc_limb *a, const tpc_limb *b, float clearance, float *along, float away[3]) {
-    const float reach = clearance * (txm_maxf(a->radius, a->end) + txm_maxf(b->radius, b->end));
-    for (int k = 0; k < 3; k++) { /* boxes apart: the usual case */
-        if (txm_minf(a->from[k], a->to[k]) - txm_maxf(b->from[k], b->to[k]) > reach) return 0;
-        if (txm_minf(b->from[k], b->to[k]) - txm_maxf(a->from[k], a->to[k]) > reach) return 0;
-    }
     float s, t, square = tpc_nearest(a, b, &s, &t, away);
     const float radii = txm_lerpf(a->radius, a->end, s) + txm_lerpf(b->radius, b->end, t);
     if (square >= clearance * clearance * radii * radii) return 0;
@@ -2495,15 +2504,21 @@ static int tpc_is_kin(const tpc_space *s, int32_t parent, int32_t other) {
 static int tpc_limb_hits(const tpc_space *s, const tpc_limb *limb, int32_t other, float clearance,
                          float fork, float away[3]) {
     const int32_t up = limb->parent;
+    const tpc_limb *b = &s->limbs[other];
+    const float between[3] = {limb->middle[0] - b->middle[0], limb->middle[1] - b->middle[1],
+                              limb->middle[2] - b->middle[2]};
+    const float thick = txm_maxf(limb->radius, limb->end) + txm_maxf(b->radius, b->end);
+    const float reach = limb->half + b->half + clearance * thick;
+    if (tpc_dot(between, between) > reach * reach) return 0; /* the usual case */
     float along;
     if (other == up || other == s->limbs[up].parent || s->limbs[other].parent == up) return 0;
     return tpc_limbs_touch(limb, &s->limbs[other], clearance, &along, away) &&
            (along > fork || !tpc_is_kin(s, up, other));
 }
 
-/* Does the stem of a node with a parent, not yet added, come too near to one of the others? away:
+/* The number of a stem to which one with a parent, not yet added, comes too near, or TREEPIECES_NONE. away:
    receives the direction out of it, not normalized. fork: see tpc_limb_hits. */
-static int tpc_space_touches(tpc_space *s, const tpc_limb *limb, float clearance, float fork, float away[3]) {
+static int32_t tpc_space_touches(tpc_space *s, const tpc_limb *limb, float clearance, float fork, float away[3]) {
     int least[3], most[3];
     tpc_limb wide = *limb;
     wide.radius *= clearance;
@@ -2511,25 +2526,157 @@ static int tpc_space_touches(tpc_space *s, const tpc_limb *limb, float clearance
     const int cells = tpc_space_range(s, &wide, least, most);
     if (cells > TPC_SPACE_CELLS) { /* rare: look at all */
         for (int32_t i = 0; i < s->limb_count; i++)
-            if (tpc_limb_hits(s, limb, i, clearance, fork, away)) return 1;
-        return 0;
+            if (tpc_limb_hits(s, limb, i, clearance, fork, away)) return i;
+        return TREEPIECES_NONE;
     }
     for (int32_t e = s->long_ones; e >= 0; e = s->entries[e].next)
-        if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return 1;
+        if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return s->entries[e].limb;
     for (int x = least[0]; x <= most[0]; x++)
         for (int y = least[1]; y <= most[1]; y++)
             for (int z = least[2]; z <= most[2]; z++)
                 for (int32_t e = *tpc_space_head(s, x, y, z); e >= 0; e = s->entries[e].next)
-                    if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return 1;
-    return 0;
+                    if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return s->entries[e].limb;
+    return TREEPIECES_NONE;
+}
+
+/* ---- the sketch of a tree ------------------------------------------------------------------ */
+
+/* A tree is sketched first: axis by axis, the most important ones first, each in full detail from its
+   base to its end. Pieces are made of the sketch afterwards, see assemble.h. Where no branch was
+   sketched a fork or side branch is a tube, and tubes that follow one another become one, as far as
+   the limit on pieces demands. What is sketched does not depend on the limit, only where it stops: so
+   trees of all limits have one skeleton, of which small ones lack the least axes. */
+
+/* By how much tubes are longer in trees of fewer pieces. */
+static float tpc_stretch(int most) {
+    return txm_clampf(sqrtf(2400 / (float)most), 1, 6);
+}
+
+/* By how much tubes cut corners, in base radii of the trunk: in large trees so little that they still keep
+   clear of others. */
+static float tpc_deviation(int most) {
+    const float few = 600 / (float)most;
+    return 0.15f * few * few * few * few;
+}
+
+/* The number of segments in a tube at most; a step is one, or one with a branch and what is left. */
+static int tpc_most_joined(float stretch) {
+    return (int)(2 * stretch) + 1;
+}
+
+/* A piece as the grammar has it. */
+typedef struct tpc_segment {
+    uint64_t seed;
+    float position[3], rotation[4]; /* of the piece, in the world                               */
+    float stem[3];                  /* its axis, unit length                                    */
+    float radius, length, ratios[TREEPIECES_MAX_LEAVES]; /* metres; over radius                 */
+    float part;                     /* of its length that bears the branches, a piece of its own */
+    float along, axis_length, step, end_radius;          /* of the axis, see tpc_bud            */
+    float longest;                  /* length of a tube that begins here, for the sake of its bark */
+    int32_t axis, node;                                  /* node: of its piece, set at the end  */
+    uint16_t depth;
+    uint8_t type, order, is_forked, leaves;
+    uint8_t main;   /* leaf rim where the axis goes on                                          */
+    uint8_t begins; /* 1: the first one of a piece                                              */
+    uint8_t grown;  /* bit k: an axis begins at leaf rim k                                      */
+    uint8_t across; /* log2 of the tiles across an edge of its leaf rims, set at the end        */
+} tpc_segment;
+
+/* A chain of segments. */
+typedef struct tpc_axis {
+    int32_t first, end;  /* its segments                                                        */
+    int32_t parent, rim; /* the segment where it begins, or TREEPIECES_NONE, and its leaf rim   */
+} tpc_axis;
+
+typedef struct tpc_sketch {
+    tpc_segment *segments; /* a chain has consecutive numbers                                   */
+    tpc_axis *axes;
+    int segment_count, axis_count, pieces; /* pieces: of all that is sketched                   */
+    int is_rigid;                          /* every segment is one piece, and every leaf rim one axis */
+    int most_joined;                       /* segments in a tube                                */
+    float stretch;                         /* longest tube, in steps of its axis                */
+    float taper;                           /* least radius of a tube above over that below      */
+    float deviation;                       /* of a tube from the joints it replaces, metres     */
+} tpc_sketch;
+
+/* Does the type lose branches that are not sketched? */
+static int tpc_is_elastic(const tpc_sketch *s, int type) {
+    return !s->is_rigid && (type == TREEPIECES_SIDE || type == TREEPIECES_PLANAR || type == TREEPIECES_Y);
+}
+
+/* Is it a stem whose branches need only a part of its length? */
+static int tpc_bears_branches(const tpc_sketch *s, int type) {
+    return !s->is_rigid && (type == TREEPIECES_SIDE || type == TREEPIECES_PLANAR);
+}
+
+/* A segment that is, or can be a part of, a tube. */
+static int tpc_is_plain(const tpc_sketch *s, const tpc_segment *t) {
+    return !s->is_rigid && (t->type == TREEPIECES_I || (tpc_is_elastic(s, t->type) && !t->grown));
+}
+
+/* A tube that is made of segments. */
+typedef struct tpc_run {
+    const tpc_segment *first; /* NULL: none yet */
+    float length;
+    int count;
+} tpc_run;
+
+/* Would the tube with one more segment remain near enough to the joint below that one? */
+static int tpc_is_straight(const tpc_sketch *s, const tpc_segment *first, const tpc_segment *t) {
+    float joint[3], end[3];
+    for (int k = 0; k < 3; k++) {
+        joint[k] = t->position[k] - first->position[k];
+        end[k] = joint[k] + t->length * t->stem[k];
+    }
+    const float square = tpc_dot(end, end), dot = tpc_dot(joint, end);
+    const float aside = s->deviation;
+    return tpc_dot(joint, joint) * square - dot * dot <= aside * aside * square &&
+           tpc_dot(first->stem, t->stem) > (first->along > 0 ? 0.86f : 0.97f);
+}
+
+/* Does the next segment of a chain begin a piece? Otherwise it becomes a part of the tube. */
+static int tpc_run_take(const tpc_sketch *s, tpc_run *run, const tpc_segment *t) {
+    const int is_plain = tpc_is_plain(s, t);
+    if (run->first && is_plain && run->count < s->most_joined &&
+        run->length + t->length <= txm_minf(s->stretch * run->first->step, run->first->longest) &&
+        t->radius * t->ratios[t->main] > s->taper * run->first->radius && tpc_is_straight(s, run->first, t)) {
+        run->length += t->length;
+        run->count++;
+        return 0;
+    }
+    run->first = is_plain ? t : NULL;
+    run->length = t->length;
+    run->count = 1;
+    return 1;
+}
+
+/* By how many pieces does the tree grow when an axis begins at a leaf rim of a segment? The tip that
+   closes a rim of a piece that loses none is counted already. Where the segment becomes a piece of its
+   own, the tube after it begins anew, and so may some that follow; is_made: take note of them. */
+static int tpc_split(tpc_sketch *s, int32_t at, int is_made) {
+    tpc_segment *t = &s->segments[at];
+    if (!tpc_is_elastic(s, t->type)) return -1;
+    if (t->grown) return 0;
+    const int32_t end = s->axes[t->axis].end;
+    tpc_run run = {NULL, 0, 0};
+    int more = !t->begins + (t->part < t->length);
+    if (is_made) t->begins = 1;
+    for (int32_t i = at + 1; i < end; i++) {
+        tpc_segment *next = &s->segments[i];
+        const int begins = tpc_run_take(s, &run, next);
+        if (begins && next->begins) break; /* as before from here on */
+        more += begins - next->begins;
+        if (is_made) next->begins = (uint8_t)begins;
+    }
+    return more;
 }
 
 /* ---- growing: the state of a tree --------------------------------------------------------- */
 
 enum {
-    TPC_BUCKETS = 160,     /* of open rims, by the logarithm of their radius                */
+    TPC_FRAME = 8,         /* axes that decide how high the tree is                         */
+    TPC_BUCKETS = 160,     /* of leaf rims that wait for an axis, by the logarithm of its length */
     TPC_GRID = 16,         /* cells along a side of the shade grid                          */
-    TPC_CLASSES = 16,      /* of oscillators                                                */
     TPC_FORK = 2,          /* radii of a stem, up to where it may touch others of its fork  */
     TPC_MAX_BRANCH = 60    /* percent: largest radius of a side branch over that of its stem */
 };
@@ -2543,16 +2690,20 @@ static const float tpc_grid_width = 1.6f;     /* of the shade grid, in trunk len
 static const float tpc_clearance = 0.04f;     /* above the ground, in trunk lengths             */
 static const float tpc_cell_steps = 1.25f;    /* of the grid of stems, in steps of the trunk    */
 
-/* An open rim. */
+static const float tpc_dome = 0.8f;           /* fall of the dome over crowns, see tpc_limit_rise  */
+static const float tpc_slack = 0.8f;          /* more clearance, as tubes cut corners             */
+static const float tpc_beyond = 10;          /* importance of reach beyond the crown, over length */
+
+/* The open rim where an axis goes on. */
 typedef struct tpc_bud {
-    int32_t next;                 /* in its bucket                                              */
-    int32_t parent;               /* node, or TREEPIECES_NONE                                   */
     uint64_t seed;                /* of all that is drawn for its piece and those beyond it     */
-    uint8_t rim, order, across;   /* across: log2 of the tiles across an edge of the rim        */
+    int32_t parent;               /* segment, or TREEPIECES_NONE                                */
+    uint8_t rim, order;
     uint8_t is_forked, is_aimed;  /* after a fork, where `start` no longer applies; `aim` is the
                                      direction of the piece after this one                      */
     uint16_t depth;
-    float position[3], rotation[4], heading[3]; /* rotation: of the rim; heading: of growth     */
+    float position[3], rotation[4], axis[3]; /* of the rim; axis: its y axis                    */
+    float heading[3];             /* of growth                                                  */
     float aim[3];
     float radius, end_radius;     /* here, and at the end of the axis                           */
     float rest;                   /* of its step, which a short branching piece left over for a
@@ -2561,6 +2712,14 @@ typedef struct tpc_bud {
     float roll;                   /* degrees about the axis to the next branch, in the
                                      frame of the rim                                           */
 } tpc_bud;
+
+/* A leaf rim that waits for its axis. */
+typedef struct tpc_wait {
+    int32_t next; /* in its bucket                                                    */
+    int32_t segment, rim;
+    float length, end[3]; /* what is expected of the axis: how long it is, and where it ends;
+                             length is less for those that may leave gaps */
+} tpc_wait;
 
 /* A tree while it grows. */
 typedef struct tpc_growth {
@@ -2576,12 +2735,17 @@ typedef struct tpc_growth {
     uint32_t *bands;   /* by node: word 3 of its record        */
     uint32_t *records; /* by node: number of its record, set at the end */
     treepieces_cluster *clusters;
-    tpc_bud *buds;
-    int node_count, cluster_count, bud_count, waiting, most, bucket;
+    tpc_sketch sketch;
+    tpc_run run; /* of the axis that grows */
+    tpc_wait *waits;
+    int node_count, cluster_count, wait_count, most, most_segments, bucket;
     int32_t first[TPC_BUCKETS], last[TPC_BUCKETS];
     uint32_t type_counts[TREEPIECES_MAX_TYPES];
     float scale, trunk, foot; /* scale of the place; length and base radius of the trunk, metres  */
     float height;
+    float low[3], high[3];          /* of the box about all stems that have grown                 */
+    float ceiling;                  /* no later stem grows above this                             */
+    float aside[TREEPIECES_MAX_ORDERS][2][2]; /* cosine and sine of angle_base and angle_top        */
     uint16_t shade[TPC_GRID][TPC_GRID][TPC_GRID]; /* x, z, y: pieces in this cell and above       */
     tpc_space space; /* where the species has a clearance */
 } tpc_growth;
@@ -2592,13 +2756,13 @@ static float tpc_uniform(tpc_growth *g, float low, float high) {
 
 /* What is drawn at an open rim depends on its seed alone, not on what grew elsewhere before: a tree of
    fewer pieces is part of one of more. */
-enum { TPC_OPENING = 1, TPC_ATTACHING }; /* streams */
+enum { TPC_OPENING = 1, TPC_ATTACHING, TPC_LEAFING }; /* streams */
 
 static void tpc_draw_for(tpc_growth *g, uint64_t seed, uint64_t stream) {
     g->rng = txm_rng_make(seed, stream);
 }
 
-/* ---- growing: open rims by radius ---------------------------------------------------------- */
+/* ---- growing: rims by the importance of their axes ------------------------------------------ */
 
 /* The bits of a positive float, which grow about as its logarithm, by 2^23 per octave. */
 static uint32_t tpc_float_bits(float x) {
@@ -2607,29 +2771,44 @@ static uint32_t tpc_float_bits(float x) {
     return bits;
 }
 
-/* Eight buckets per octave, the thickest first. */
-static int tpc_bucket(float radius) {
-    return txm_clampi((int)(0x43000000u >> 20) - (int)(tpc_float_bits(radius) >> 20), 0, TPC_BUCKETS - 1);
+/* Eight buckets per octave, the most important first: from 2, in lengths of the trunk. */
+static int tpc_bucket(float importance) {
+    return txm_clampi((int)(0x40000000u >> 20) - (int)(tpc_float_bits(importance) >> 20), 0, TPC_BUCKETS - 1);
 }
 
-/* Put the bud after the last one into its bucket. */
-static void tpc_push(tpc_growth *g) {
-    const int i = g->bud_count++, b = tpc_bucket(g->buds[i].radius);
-    g->buds[i].next = -1;
+/* The longer an axis is, and the further it leads out of the box about what has grown so far, the more
+   does the tree lose without it. */
+static float tpc_importance(const tpc_growth *g, const tpc_wait *w) {
+    float beyond = 0;
+    for (int k = 0; k < 3; k++) {
+        beyond = txm_maxf(beyond, (k == 1 ? 2.0f : 1.0f) * (w->end[k] - g->high[k]));
+        if (k != 1) beyond = txm_maxf(beyond, g->low[k] - w->end[k]);
+    }
+    return (w->length + tpc_beyond * beyond) / g->trunk;
+}
+
+/* Put a rim after the last one into its bucket. */
+static void tpc_push(tpc_growth *g, int32_t i) {
+    tpc_wait *w = &g->waits[i];
+    const int b = tpc_bucket(tpc_importance(g, w));
+    w->next = -1;
     if (g->first[b] < 0) g->first[b] = i;
-    else g->buds[g->last[b]].next = i;
+    else g->waits[g->last[b]].next = i;
     g->last[b] = i;
-    g->waiting++;
-    if (b < g->bucket) g->bucket = b; /* a rule of the caller may let a stem grow thicker */
+    if (b < g->bucket) g->bucket = b;
 }
 
-/* Take out the thickest open rim; there must be one. */
-static tpc_bud *tpc_pop(tpc_growth *g) {
-    while (g->first[g->bucket] < 0) g->bucket++;
-    tpc_bud *bud = &g->buds[g->first[g->bucket]];
-    g->first[g->bucket] = bud->next;
-    g->waiting--;
-    return bud;
+/* Take out the most important one, or NULL. Where the tree has grown meanwhile, it waits again. */
+static const tpc_wait *tpc_pop(tpc_growth *g) {
+    for (;;) {
+        while (g->bucket < TPC_BUCKETS && g->first[g->bucket] < 0) g->bucket++;
+        if (g->bucket == TPC_BUCKETS) return NULL;
+        const int b = g->bucket;
+        const int32_t i = g->first[b];
+        g->first[b] = g->waits[i].next;
+        if (tpc_bucket(tpc_importance(g, &g->waits[i])) <= b) return &g->waits[i];
+        tpc_push(g, i);
+    }
 }
 
 /* ---- growing: pruning ---------------------------------------------------------------------- */
@@ -2687,7 +2866,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
     const treepieces_order *o = tpc_order(g, bud->order);
     if (bud->depth == 0 && g->species->flare > 1) return TREEPIECES_FLARE;
     if ((1 - bud->along) * bud->length < 0.5f * bud->step || tpc_is_outside(g, bud) ||
-        tpc_is_shaded(g, bud))
+        tpc_is_shaded(g, bud) || bud->position[1] > g->ceiling)
         return TREEPIECES_TIP;
     /* a hanging axis ends before it reaches the ground */
     if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < tpc_clearance * g->trunk)
@@ -2719,16 +2898,31 @@ static float tpc_shortest(int type) {
     return low[type];
 }
 
-/* The length of the next piece, limited to a range of radii so that its type keeps its proportions. */
-static float tpc_choose_length(const tpc_bud *bud, int type) {
-    const float low = tpc_shortest(type);
+/* log2 of the tiles across an edge of a rim, as tpc_bands comes to it. */
+static int tpc_tiles_across(const tpc_growth *g, float radius) {
+    int across = 0;
+    while (across < 4 && radius >= tpc_halving_width * tpc_tile_width * g->foot * (float)(2 << across))
+        across++;
+    return across;
+}
+
+/* The most length of a piece, in radii: at most 8 tiles lie along a quad, so one with many across must not be
+   long. */
+static float tpc_tallest(const tpc_growth *g, float radius, int type) {
     static const float high[TREEPIECES_BUILTIN] = {40, 2.5f, 3, 3, 2.5f, 18, 1.4f};
+    const int across = tpc_tiles_across(g, radius);
+    return txm_minf(high[type], (type == TREEPIECES_I ? 64.0f : 20.0f) / (float)(1 << across));
+}
+
+/* The length of the next segment, limited to a range of radii so that its type keeps its proportions. */
+static float tpc_choose_length(const tpc_growth *g, const tpc_bud *bud, int type) {
+    const float low = tpc_shortest(type);
     const float left = (1 - bud->along) * bud->length;
     const float step = bud->rest > 0 ? bud->rest : bud->step;
     float length = step < left ? step : left;
     if (type == TREEPIECES_TIP && length < 0.7f * bud->step) length = 0.7f * bud->step;
-    /* at most 8 tiles lie along a quad, so one with many across must not be long */
-    const float most = txm_minf(high[type], (type == TREEPIECES_I ? 64.0f : 20.0f) / (float)(1 << bud->across));
+    const int as = tpc_bears_branches(&g->sketch, type) ? (int)TREEPIECES_I : type;
+    const float most = tpc_tallest(g, bud->radius, as);
     return txm_clampf(length, low * bud->radius, txm_maxf(most, low) * bud->radius);
 }
 
@@ -2738,7 +2932,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
     memset(c, 0, sizeof *c);
     c->type = type;
     memcpy(c->direction, bud->heading, sizeof c->direction);
-    c->length = tpc_choose_length(bud, type);
+    c->length = tpc_choose_length(g, bud, type);
     c->turn = type == TREEPIECES_I ? (int)txm_rng_below(&g->rng, TREEPIECES_RIM) : -1;
     const float left = (1 - bud->along) * bud->length;
     const float share = left > c->length ? c->length / left : 1;
@@ -2763,6 +2957,16 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
     }
     c->leaves = g->species->leaf_count > 0 && bud->along >= o->leaves_start && o->leaves > 0 &&
                 txm_rng_float(&g->rng) < o->leaves;
+}
+
+/* The first axes decide how high the tree is: others rise less and less under a dome as high, and end there. */
+static void tpc_limit_rise(const tpc_growth *g, tpc_bud *bud) {
+    const float x = bud->position[0] - g->place.position[0], z = bud->position[2] - g->place.position[2];
+    const float room = g->ceiling - bud->position[1] - tpc_dome * (x * x + z * z) / g->trunk;
+    if (bud->heading[1] * 3 * bud->step <= room || bud->heading[1] <= 0) return;
+    bud->heading[1] = txm_maxf(room / (3 * bud->step), 0);
+    tpc_unit_or_up(bud->heading);
+    if (room < 0.5f * bud->step) bud->along = 1;
 }
 
 /* Turn the axis a little: wander, tropism, sag. */
@@ -2814,64 +3018,21 @@ static int tpc_nearest_sixth(float degrees, float *rest) {
     return (whole % TREEPIECES_RIM + TREEPIECES_RIM) % TREEPIECES_RIM;
 }
 
-/* The joint rotation that lets the stem grow along `heading` (world space) from the frame of a rim
-   turned by `turn`: a twist in degrees, then the shortest rotation of y to the heading. */
-static void tpc_joint(const float rim[4], int turn, const float heading[3], float twist,
-                      float joint[4]) {
-    const float back[4] = {-rim[0], -rim[1], -rim[2], rim[3]};
-    float h[3];
-    tpc_rotate(back, heading, h);
-    tpc_turn((TREEPIECES_RIM - turn) % TREEPIECES_RIM, h, h);
-    if (h[1] < 0.5f) { /* limited to 60 degrees */
-        const float level = sqrtf(h[0] * h[0] + h[2] * h[2]);
+/* Turn a frame so that its y axis, `axis`, comes to lie along `heading`, by the shortest rotation. Both are
+   unit vectors; the heading is limited to 60 degrees from the axis. out may be the frame. */
+static void tpc_turn_to(const float axis[3], float heading[3], const float frame[4], float out[4]) {
+    float cosine = tpc_dot(axis, heading), across[3];
+    if (cosine < 0.5f) {
+        for (int k = 0; k < 3; k++) heading[k] -= cosine * axis[k];
+        const float level = sqrtf(tpc_dot(heading, heading));
         const float shrink = level > 0 ? 0.86602540378f / level : 0;
-        h[0] *= shrink;
-        h[2] *= shrink;
-        h[1] = level > 0 ? 0.5f : 1;
+        cosine = level > 0 ? 0.5f : 1;
+        for (int k = 0; k < 3; k++) heading[k] = cosine * axis[k] + shrink * heading[k];
     }
-    const float scale = 1 / sqrtf(h[2] * h[2] + h[0] * h[0] + (1 + h[1]) * (1 + h[1]));
-    joint[0] = h[2] * scale;
-    joint[1] = 0;
-    joint[2] = -h[0] * scale;
-    joint[3] = (1 + h[1]) * scale;
-    if (twist != 0) { /* t: tangent of half the twist, 15 degrees at most */
-        const float x = twist * 0.00872664626f, t = x * (1 + x * x * (0.33333333f + 0.13333333f * x * x));
-        const float shorter = 1 / sqrtf(1 + t * t), about[4] = {0, t * shorter, 0, shorter};
-        tpc_multiply(joint, about, joint);
-    }
-}
-
-/* Word 3 of a record: log2 of the number of tiles along and across the quads of each band. Where tiles
-   would be too narrow, the number across is halved. across: receives its log2 at each leaf rim. */
-static uint32_t tpc_bands(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
-                          int across[TREEPIECES_MAX_LEAVES]) {
-    static const uint8_t halvable[TREEPIECES_BUILTIN] = {3, 1, 1, 1, 1, 0, 2};
-    const float tile = tpc_tile_width * g->foot;
-    const tpc_band *band = g->kit->bands[c->type];
-    const int may = c->type < TREEPIECES_BUILTIN ? halvable[c->type] : 0;
-    const int leaves = g->kit->pieces[c->type].leaf_count;
-    int now = bud->across;
-    uint32_t word = 0;
-    for (int b = 0; b < g->kit->band_counts[c->type]; b++) {
-        /* the stem's radius above the band; bands of branches begin as wide as band 0 ends */
-        const float part = c->type == TREEPIECES_I && b == 0 ? 0.5f : 1;
-        const float radius = bud->radius * (1 + (c->ratios[0] - 1) * part);
-        int halve = 0;
-        const int is_as_before = b == 1 && c->type != TREEPIECES_I && c->type != TREEPIECES_FLARE;
-        const float least = tpc_halving_width * tile * (float)(1 << now);
-        if (!is_as_before && (may >> b & 1) && now > 0 && radius < least) {
-            halve = 1;
-            now--;
-        }
-        const float width = bud->radius / (float)(1 << now);
-        const float dy = band[b].rise * c->length, dr = band[b].spread * bud->radius;
-        const float height = sqrtf(dy * dy + dr * dr);
-        int along = 0;
-        while (along < 3 && height > 1.41f * width * (float)(1 << along)) along++;
-        word |= (uint32_t)(now | along << 3 | halve << 5) << (8 * b);
-    }
-    for (int k = 0; k < leaves; k++) across[k] = now;
-    return word;
+    tpc_cross(axis, heading, across);
+    const float scale = 1 / sqrtf(tpc_dot(across, across) + (1 + cosine) * (1 + cosine));
+    const float arc[4] = {scale * across[0], scale * across[1], scale * across[2], scale * (1 + cosine)};
+    tpc_multiply(arc, frame, out);
 }
 
 /* A thick branch at a small angle to its stem would have its rim inside the stem, and a pocket
@@ -2895,44 +3056,144 @@ static void tpc_turn_aside(tpc_bud *bud, float degrees, const float stem[3], con
     for (int i = 0; i < 3; i++) bud->heading[i] = ahead * stem[i] + aside * out[i];
 }
 
-/* The bud at leaf rim k of a fork: the axis goes on as one of its arms. */
-static void tpc_open_arm(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
-                         const float stem[3], const float out[3], tpc_bud *bud) {
-    const treepieces_order *o = tpc_order(g, from->order);
-    const int arms = g->kit->pieces[c->type].leaf_count;
-    float mean = 0;
-    bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
-    for (int i = 0; i < arms; i++) mean += c->ratios[i] / (float)arms;
-    /* the thicker arm is straighter */
-    const float straighter = txm_clampf(1 - 2.5f * (c->ratios[k] / mean - 1), 0.3f, 1.7f);
-    tpc_turn_aside(bud, o->fork_angle * straighter, stem, out);
-    bud->length *= o->fork_ratio * tpc_uniform(g, 0.85f, 1.1f);
-    bud->end_radius =
-        txm_maxf(bud->end_radius * c->ratios[k], txm_minf(bud->radius, tpc_thinnest(g)));
-    bud->is_forked = 1;
-    bud->is_aimed = 0;
+/* How a piece sits on a rim. */
+typedef struct tpc_seat {
+    float after;       /* what is left of the bud's roll, degrees                       */
+    float stem[3];     /* the axis of the piece, unit length                            */
+    float rotation[4]; /* in the world                                                  */
+} tpc_seat;
+
+/* The piece is turned about the rim's axis, then its stem grows along the direction chosen. A tube of a
+   sketch need not turn. */
+static void tpc_seat_piece(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c, tpc_seat *seat) {
+    int turn = c->turn;
+    float twist = 0;
+    memcpy(seat->stem, c->direction, sizeof seat->stem);
+    tpc_unit_or_up(seat->stem);
+    if (turn < 0) turn = tpc_nearest_sixth(bud->roll, &twist);
+    if (c->type == TREEPIECES_I && !g->sketch.is_rigid) turn = 0;
+    seat->after = bud->roll - (60 * (float)turn + twist);
+    tpc_turn_to(bud->axis, seat->stem, bud->rotation, seat->rotation);
+    if (turn) tpc_multiply(seat->rotation, tpc_turns[turn], seat->rotation);
+    if (twist != 0) { /* t: tangent of half the twist, 15 degrees at most */
+        const float x = twist * 0.00872664626f, t = x * (1 + x * x * (0.33333333f + 0.13333333f * x * x));
+        const float shorter = 1 / sqrtf(1 + t * t), about[4] = {0, t * shorter, 0, shorter};
+        tpc_multiply(seat->rotation, about, seat->rotation);
+    }
 }
 
-/* The bud at leaf rim k, at this distance from the stem's axis, where a branch begins. */
-static void tpc_open_branch(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
-                            float offset, const float stem[3], const float out[3], tpc_bud *bud) {
+/* The stem of a piece that sits so. */
+static void tpc_limb_of(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                        const tpc_seat *seat, tpc_limb *stem) {
+    for (int k = 0; k < 3; k++) {
+        stem->from[k] = bud->position[k];
+        stem->to[k] = bud->position[k] + c->length * seat->stem[k];
+    }
+    stem->radius = bud->radius;
+    stem->end = g->kit->pieces[c->type].leaf_count ? bud->radius * c->ratios[0] : 0;
+    stem->parent = bud->parent;
+    tpc_limb_measure(stem);
+}
+
+/* The direction from the stem to the middle of leaf rim k, which is not on the axis. */
+static void tpc_find_out(const tpc_growth *g, const tpc_segment *from, int k, float out[3]) {
+    const float *to = g->kit->pieces[from->type].building[k].translation;
+    const float offset = g->kit->offsets[from->type][k];
+    out[0] = to[0] / offset;
+    out[1] = 0;
+    out[2] = to[2] / offset;
+    tpc_rotate(from->rotation, out, out);
+}
+
+static int tpc_is_fork(int type) {
+    return type == TREEPIECES_Y || type == TREEPIECES_SPATIAL;
+}
+
+/* The length of an axis that begins at a segment, without what is drawn for it; out: away from the stem
+   there. That of a fork counts from the base of the axis that splits. */
+static float tpc_expect_length(const tpc_growth *g, const tpc_segment *from, const float out[3]) {
+    if (tpc_is_fork(from->type))
+        return from->axis_length * tpc_order(g, from->order)->fork_ratio;
     const treepieces_order *o = tpc_order(g, from->order + 1), *parent = tpc_order(g, from->order);
-    if (from->order + 1 < g->species->order_count) bud->order++;
-    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
-                        tpc_uniform(g, -1, 1) * o->angle_spread;
-    tpc_turn_aside(bud, txm_clampf(angle, 5, 175), stem, out);
-    bud->heading[1] *= 1 - o->flatten * (1 - stem[1] * stem[1]);
-    tpc_unit_or_up(bud->heading);
-    tpc_stand_off(bud, stem, out, c->ratios[k], offset);
     const float t = from->is_forked || parent->start >= 1
                         ? from->along
                         : txm_clampf((from->along - parent->start) / (1 - parent->start), 0, 1);
     float longer = o->profile[0] * (1 - t) * (1 - 2 * t) + o->profile[1] * 4 * t * (1 - t) +
                    o->profile[2] * t * (2 * t - 1);
     longer *= 1 + o->gravimorphism * out[1];
-    bud->length = from->length * o->length * txm_clampf(longer, 0.02f, 10) *
-                  tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
-    bud->step = from->length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
+    return from->axis_length * o->length * txm_clampf(longer, 0.02f, 10);
+}
+
+/* 0..1: the digits of a number in reverse behind the binary point. The numbers below any limit are spread
+   evenly, and so are those whose result is below one. */
+static float tpc_reverse(uint32_t n) {
+    float result = 0, bit = 0.5f;
+    for (; n; n >>= 1, bit *= 0.5f)
+        if (n & 1) result += bit;
+    return result;
+}
+
+/* Let leaf rim k of a segment wait for its axis; number: of the segment among those of its axis that bear
+   any. Among branches side by side every second one is more important, and so on: where some do not
+   grow, the others are spread along the stem. */
+static void tpc_wait_for_axis(tpc_growth *g, int32_t at, int k, int number) {
+    TXM_ASSERT(g->wait_count < (TREEPIECES_MAX_LEAVES - 1) * g->most_segments);
+    const tpc_segment *from = &g->sketch.segments[at];
+    const float spread = tpc_reverse((uint32_t)number);
+    tpc_wait *w = &g->waits[g->wait_count];
+    float out[3], ahead = 0.9f, aside = 0.4f; /* of a fork */
+    tpc_find_out(g, from, k, out);
+    w->segment = at;
+    w->rim = k;
+    w->length = tpc_expect_length(g, from, out);
+    if (tpc_is_fork(from->type)) {
+        w->length *= 1 - from->along;
+    } else {
+        const int order = from->order + 1 < g->species->order_count ? from->order + 1 : from->order;
+        ahead = txm_lerpf(g->aside[order][0][0], g->aside[order][1][0], from->along);
+        aside = txm_lerpf(g->aside[order][0][1], g->aside[order][1][1], from->along);
+    }
+    for (int i = 0; i < 3; i++)
+        w->end[i] = from->position[i] + from->length * from->stem[i] +
+                    w->length * (ahead * from->stem[i] + aside * out[i]);
+    if (!tpc_is_fork(from->type)) { /* not only the longest ones */
+        const float even = from->axis_length * tpc_order(g, from->order + 1)->length;
+        w->length = sqrtf(even * w->length) / (1 + 3 * spread);
+    }
+    tpc_push(g, g->wait_count++);
+}
+
+/* The bud at leaf rim k of a fork: the axis goes on as one of its arms. */
+static void tpc_open_arm(tpc_growth *g, const tpc_segment *from, int k, const float out[3], tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, from->order);
+    const int arms = g->kit->pieces[from->type].leaf_count;
+    float mean = 0;
+    bud->roll = tpc_uniform(g, 60, 120); /* the next fork lies across this one */
+    for (int i = 0; i < arms; i++) mean += from->ratios[i] / (float)arms;
+    /* the thicker arm is straighter, and the axis itself runs on */
+    const float runs_on = k == from->main && !g->sketch.is_rigid ? 0.6f : 1;
+    const float straighter = runs_on * txm_clampf(1 - 2.5f * (from->ratios[k] / mean - 1), 0.3f, 1.7f);
+    tpc_turn_aside(bud, o->fork_angle * straighter, from->stem, out);
+    bud->length = tpc_uniform(g, 0.85f, 1.1f) * tpc_expect_length(g, from, out);
+    if (runs_on < 1) bud->length = from->axis_length;
+    bud->end_radius =
+        txm_maxf(from->end_radius * from->ratios[k], txm_minf(bud->radius, tpc_thinnest(g)));
+    bud->is_forked = 1;
+    bud->is_aimed = 0;
+}
+
+/* The bud at leaf rim k, where a branch begins. */
+static void tpc_open_branch(tpc_growth *g, const tpc_segment *from, int k, const float out[3], tpc_bud *bud) {
+    const treepieces_order *o = tpc_order(g, from->order + 1);
+    if (from->order + 1 < g->species->order_count) bud->order++;
+    const float angle = o->angle_base + (o->angle_top - o->angle_base) * from->along +
+                        tpc_uniform(g, -1, 1) * o->angle_spread;
+    tpc_turn_aside(bud, txm_clampf(angle, 5, 175), from->stem, out);
+    bud->heading[1] *= 1 - o->flatten * (1 - from->stem[1] * from->stem[1]);
+    tpc_unit_or_up(bud->heading);
+    tpc_stand_off(bud, from->stem, out, from->ratios[k], g->kit->offsets[from->type][k]);
+    bud->length = tpc_expect_length(g, from, out) * tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);
+    bud->step = from->axis_length * o->length / o->segments * tpc_uniform(g, 0.9f, 1.1f);
     if (bud->step < 1.5f * bud->radius) bud->step = 1.5f * bud->radius;
     bud->end_radius = txm_maxf(bud->radius * o->taper, txm_minf(bud->radius, tpc_thinnest(g)));
     bud->along = 0;
@@ -2941,141 +3202,61 @@ static void tpc_open_branch(tpc_growth *g, const tpc_bud *from, const treepieces
     bud->roll = tpc_uniform(g, 0, 360);
 }
 
-/* Set up the bud at leaf rim k of the piece just attached, where an axis continues or begins; on
-   entry bud is a copy of from. */
-static void tpc_open_rim(tpc_growth *g, const tpc_bud *from, const treepieces_choice *c, int k,
-                         const float rotation[4], tpc_bud *bud) {
-    const treepieces_similarity *b = &g->kit->pieces[c->type].building[k];
-    const float offset = g->kit->offsets[c->type][k];
-    const float local[3] = {b->translation[0] * from->radius, b->translation[1] * c->length,
+/* Set up the bud at leaf rim k of a segment, where an axis goes on or begins. Where one goes on, bud is,
+   on entry, that of the segment. */
+static void tpc_open_rim(tpc_growth *g, int32_t at, int k, tpc_bud *bud) {
+    const tpc_segment *from = &g->sketch.segments[at];
+    const treepieces_similarity *b = &g->kit->pieces[from->type].building[k];
+    const float length = k == from->main ? from->length : from->part;
+    const float local[3] = {b->translation[0] * from->radius, b->translation[1] * length,
                             b->translation[2] * from->radius};
-    const float up[3] = {0, 1, 0};
-    float stem[3], out[3];
+    bud->seed = txm_hash(from->seed + (uint64_t)(k + 1) * 0x9e3779b97f4a7c15u);
+    tpc_draw_for(g, bud->seed, TPC_OPENING);
     bud->rim = (uint8_t)k;
-    bud->parent = g->node_count - 1;
+    bud->parent = at;
+    bud->order = from->order;
+    bud->is_forked = from->is_forked;
     bud->depth = (uint16_t)(from->depth + 1);
-    bud->radius = from->radius * c->ratios[k];
-    tpc_multiply_by_building(rotation, b->rotation, bud->rotation);
-    tpc_rotate(rotation, up, stem);
-    for (int i = 0; i < 3; i++) bud->position[i] = stem[i] * local[1];
-    if (offset > 0) tpc_rotate(rotation, local, bud->position);
+    bud->radius = from->radius * from->ratios[k];
+    bud->end_radius = from->end_radius;
+    bud->length = from->axis_length;
+    bud->step = from->step;
+    tpc_multiply_by_building(from->rotation, b->rotation, bud->rotation);
+    if (g->kit->offsets[from->type][k] > 0) tpc_rotate(from->rotation, local, bud->position);
+    else
+        for (int i = 0; i < 3; i++) bud->position[i] = from->stem[i] * local[1];
     for (int i = 0; i < 3; i++) bud->position[i] += from->position[i];
-    memcpy(bud->heading, stem, sizeof stem);
-    bud->along = from->along + local[1] / from->length;
+    bud->along = from->along + local[1] / from->axis_length;
     if (bud->along > 1) bud->along = 1;
-    bud->rest = c->type == TREEPIECES_I ? 0 : from->step - c->length;
+    bud->rest = from->type == TREEPIECES_I ? 0 : from->step - from->length;
     if (bud->rest < bud->radius) bud->rest = 0;
-    if (offset < 0.3f) { /* the stem itself */
-        if (from->is_aimed) memcpy(bud->heading, from->aim, sizeof from->aim);
+    memcpy(bud->axis, from->stem, sizeof bud->axis);
+    if (b->rotation[3] < 1) {
+        const float up[3] = {0, 1, 0};
+        tpc_rotate(bud->rotation, up, bud->axis);
+    }
+    if (g->kit->offsets[from->type][k] < 0.3f) { /* the stem itself */
+        memcpy(bud->heading, bud->is_aimed ? bud->aim : from->stem, sizeof bud->heading);
         bud->is_aimed = 0;
         tpc_steer(g, bud, local[1]);
+        tpc_limit_rise(g, bud);
         return;
     }
-    const float radial[3] = {b->translation[0] / offset, 0, b->translation[2] / offset};
-    tpc_rotate(rotation, radial, out);
-    if (c->type == TREEPIECES_Y || c->type == TREEPIECES_SPATIAL)
-        tpc_open_arm(g, from, c, k, stem, out, bud);
-    else tpc_open_branch(g, from, c, k, offset, stem, out, bud);
+    float out[3];
+    tpc_find_out(g, from, k, out);
+    if (tpc_is_fork(from->type)) tpc_open_arm(g, from, k, out, bud);
+    else tpc_open_branch(g, from, k, out, bud);
+    tpc_limit_rise(g, bud);
 }
 
-static void tpc_add_cluster(tpc_growth *g, int type) {
-    TXM_ASSERT(g->cluster_count < g->most);
-    treepieces_cluster *c = &g->clusters[g->cluster_count++];
-    c->node = (uint32_t)(g->node_count - 1);
-    c->along = type == TREEPIECES_TIP ? 0.7f : tpc_uniform(g, 0.2f, 1);
-    c->radius = g->species->cloud * g->scale * tpc_uniform(g, 0.75f, 1.2f);
-    c->look = txm_rng_next(&g->rng);
-}
-
-/* How a piece sits on a rim. */
-typedef struct tpc_seat {
-    int turn;
-    float after;                 /* what is left of the bud's roll, degrees */
-    float joint[4], rotation[4]; /* rotation: in the world                  */
-} tpc_seat;
-
-static void tpc_seat_piece(const tpc_bud *bud, const treepieces_choice *c, tpc_seat *seat) {
-    float heading[3] = {c->direction[0], c->direction[1], c->direction[2]}, twist = 0;
-    seat->turn = c->turn;
-    tpc_unit_or_up(heading);
-    if (c->turn < 0) seat->turn = tpc_nearest_sixth(bud->roll, &twist);
-    seat->after = bud->roll - (60 * (float)seat->turn + twist);
-    tpc_joint(bud->rotation, seat->turn, heading, twist, seat->joint);
-    if (seat->turn) tpc_multiply(tpc_turns[seat->turn], seat->joint, seat->joint);
-    tpc_multiply(bud->rotation, seat->joint, seat->rotation);
-}
-
-/* The stem of a piece that sits so. */
-static void tpc_limb_of(const tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
-                        const tpc_seat *seat, tpc_limb *stem) {
-    const float up[3] = {0, 1, 0};
-    float direction[3];
-    tpc_rotate(seat->rotation, up, direction);
-    for (int k = 0; k < 3; k++) {
-        stem->from[k] = bud->position[k];
-        stem->to[k] = bud->position[k] + c->length * direction[k];
-    }
-    stem->radius = bud->radius;
-    stem->end = g->kit->pieces[c->type].leaf_count ? bud->radius * c->ratios[0] : 0;
-    stem->parent = bud->parent;
-}
-
-/* Attach the chosen piece to the rim; its leaf rims become open. */
-static void tpc_attach(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
-                       const tpc_seat *seat) {
-    const treepieces_piece *p = &g->kit->pieces[c->type];
-    treepieces_node *node = &g->nodes[g->node_count];
-    int across[TREEPIECES_MAX_LEAVES] = {0, 0, 0};
-    /* node rotations are relative to the parent, rim frames include the building rotation */
-    if (bud->parent >= 0) {
-        const int type = g->nodes[bud->parent].type;
-        tpc_multiply_building(g->kit->pieces[type].building[bud->rim].rotation, seat->joint,
-                              node->rotation);
-    } else {
-        memcpy(node->rotation, seat->rotation, sizeof seat->rotation);
-    }
-    node->radius = bud->radius;
-    node->length = c->length;
-    node->parent = bud->parent;
-    node->type = (uint8_t)c->type;
-    node->joint = (uint8_t)(bud->rim * 8 + seat->turn);
-    node->order = bud->order;
-    /* the thinner the faster: two classes per octave, plus one at random */
-    const int sway = (int)(tpc_float_bits(g->foot) >> 22) - (int)(tpc_float_bits(bud->radius) >> 22) +
-                     (int)(txm_rng_next(&g->rng) >> 31);
-    node->sway = (uint8_t)txm_clampi(sway, 0, TPC_CLASSES - 1);
-    g->bands[g->node_count] = tpc_bands(g, bud, c, across);
-    g->type_counts[c->type]++;
-    g->node_count++;
-    if (c->leaves) tpc_add_cluster(g, c->type);
-    tpc_cast_shade(g, bud->position);
-    if (bud->position[1] - g->place.position[1] > g->height)
-        g->height = bud->position[1] - g->place.position[1];
-    if (!p->leaf_count) return;
-
-    for (int k = 0; k < p->leaf_count; k++) {
-        TXM_ASSERT(g->bud_count < g->most); /* each becomes a node, see tpc_grow */
-        tpc_bud *next = &g->buds[g->bud_count];
-        *next = *bud;
-        next->seed = txm_hash(bud->seed + (uint64_t)(k + 1) * 0x9e3779b97f4a7c15u);
-        next->roll = seat->after;
-        next->across = (uint8_t)across[k];
-        tpc_draw_for(g, next->seed, TPC_OPENING);
-        tpc_open_rim(g, bud, c, k, seat->rotation, next);
-        if (k == 0 && (c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR))
-            next->roll = seat->after + tpc_order(g, bud->order + 1)->roll; /* of the next branch */
-        tpc_push(g);
-    }
-}
-
-/* ---- growing: one tree --------------------------------------------------------------------- */
+/* ---- growing: axis by axis --------------------------------------------------------------------- */
 
 /* Call the caller's rule and check its choice; 0 if that is invalid. */
 static int tpc_call_rule(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) {
     treepieces_site site;
     site.depth = bud->depth;
     site.order = bud->order;
-    site.parent = bud->parent < 0 ? -1 : g->nodes[bud->parent].type;
+    site.parent = bud->parent < 0 ? -1 : g->sketch.segments[bud->parent].type;
     site.rim = bud->rim;
     site.tree = g->index;
     memcpy(site.position, bud->position, sizeof site.position);
@@ -3101,12 +3282,22 @@ static int tpc_call_rule(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c
     return g->status == TXM_OK;
 }
 
+/* What is the same for all trees of a limit: how far the pieces of a tree of few are stretched. */
+static void tpc_begin_sketch(tpc_growth *g) {
+    tpc_sketch *s = &g->sketch;
+    s->segment_count = s->axis_count = s->pieces = 0;
+    s->is_rigid = g->desc->rule != TREEPIECES_GRAMMAR || g->desc->own_rule;
+    s->stretch = tpc_stretch(g->most);
+    s->most_joined = tpc_most_joined(s->stretch);
+    s->taper = txm_minf(0.65f, 0.65f * (float)g->most / 150);
+    s->deviation = tpc_deviation(g->most) * g->foot;
+}
+
 /* Reset a slot and open the first rim, on the ground. */
-static void tpc_begin_tree(tpc_growth *g) {
+static void tpc_begin_tree(tpc_growth *g, tpc_bud *bud) {
     const treepieces_order *o = &g->species->orders[0];
-    tpc_bud *bud = &g->buds[0];
     memset(bud, 0, sizeof *bud);
-    g->node_count = g->cluster_count = g->bud_count = g->waiting = 0;
+    g->node_count = g->cluster_count = g->wait_count = 0;
     g->bucket = 0;
     g->height = 0;
     g->status = TXM_OK;
@@ -3124,14 +3315,23 @@ static void tpc_begin_tree(tpc_growth *g) {
     txm_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
     bud->rotation[1] = txm_float(sine);
     bud->rotation[3] = txm_float(cosine);
-    bud->heading[1] = 1;
+    bud->axis[1] = bud->heading[1] = 1;
     bud->radius = g->foot * (g->species->flare > 1 ? g->species->flare : 1);
     bud->end_radius = txm_maxf(g->foot * o->taper, tpc_thinnest(g));
     bud->length = g->trunk;
     bud->step = g->trunk / o->segments;
-    bud->across = 4;
     bud->roll = tpc_uniform(g, 0, 360);
-    tpc_push(g);
+    g->ceiling = 1e30f;
+    for (int k = 0; k < 3; k++) g->low[k] = g->high[k] = bud->position[k];
+    for (int i = 0; i < g->species->order_count; i++) {
+        const treepieces_order *a = tpc_order(g, i);
+        for (int top = 0; top < 2; top++) {
+            txm_sincos((double)(top ? a->angle_top : a->angle_base) * (TXM_PI / 180), &sine, &cosine);
+            g->aside[i][top][0] = txm_float(cosine);
+            g->aside[i][top][1] = txm_float(sine);
+        }
+    }
+    tpc_begin_sketch(g);
     if (g->species->clearance > 0)
         tpc_space_clear(&g->space, tpc_cell_steps * bud->step + 2 * bud->radius);
 }
@@ -3141,92 +3341,374 @@ static void tpc_end_axis(const tpc_growth *g, const tpc_bud *bud, treepieces_cho
     c->type = TREEPIECES_TIP;
     c->turn = 0;
     memcpy(c->direction, bud->heading, sizeof c->direction);
-    c->length = tpc_choose_length(bud, TREEPIECES_TIP);
+    c->length = tpc_choose_length(g, bud, TREEPIECES_TIP);
     c->leaves = g->species->leaf_count > 0 && bud->order > 0;
 }
 
-/* Seat the piece, which gives its stem; is another one in the way? away: out of that. */
-static int tpc_is_in_the_way(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
-                             tpc_seat *seat, tpc_limb *limb, float away[3]) {
-    const float fork = (float)TPC_FORK * bud->radius;
-    tpc_seat_piece(bud, c, seat);
+/* Seat the piece, which gives its stem. Returns the segment that is in the way, or TREEPIECES_NONE; away: out
+   of that. */
+static int32_t tpc_find_obstacle(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                                 tpc_seat *seat, tpc_limb *limb, float away[3]) {
+    tpc_seat_piece(g, bud, c, seat);
     tpc_limb_of(g, bud, c, seat, limb);
-    return bud->parent >= 0 &&
-           tpc_space_touches(&g->space, limb, g->species->clearance, fork, away);
+    if (bud->parent < 0) return TREEPIECES_NONE;
+    return tpc_space_touches(&g->space, limb, g->species->clearance + tpc_slack, (float)TPC_FORK * bud->radius, away);
 }
 
-/* Would a branch of the piece, seated so, begin within another stem? */
-static int tpc_is_branch_blocked(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
-                                 const tpc_seat *seat) {
-    const treepieces_piece *p = &g->kit->pieces[c->type];
-    float away[3];
-    for (int k = 1; k < p->leaf_count; k++) {
-        const float *to = p->building[k].translation, offset = g->kit->offsets[c->type][k];
-        const float radius = bud->radius * c->ratios[k];
-        float rim[3] = {to[0] * bud->radius, to[1] * c->length, to[2] * bud->radius};
-        float out[3] = {to[0] / offset, 0, to[2] / offset};
-        tpc_limb stub;
-        tpc_rotate(seat->rotation, rim, rim);
-        tpc_rotate(seat->rotation, out, out);
-        for (int i = 0; i < 3; i++) {
-            stub.from[i] = bud->position[i] + rim[i];
-            stub.to[i] = stub.from[i] + tpc_shortest(TREEPIECES_TIP) * radius * out[i];
-        }
-        stub.radius = stub.end = radius;
-        stub.parent = bud->parent;
-        if (tpc_space_touches(&g->space, &stub, g->species->clearance, 0, away)) return 1;
-    }
-    return 0;
+/* Does a segment belong to the axis that grows, or to that where it began? */
+static int tpc_is_own_stem(const tpc_growth *g, const tpc_bud *bud, int is_first, int32_t other) {
+    const tpc_sketch *s = &g->sketch;
+    const int32_t own = s->segments[bud->parent].axis, begins = s->axes[own].parent;
+    if (s->segments[other].axis == own) return 1;
+    return !is_first && begins >= 0 && s->segments[other].axis == s->segments[begins].axis;
 }
 
 /* Seat the piece where it comes too near to no other stem: as chosen, or turned out of the way, or as
-   the end of its axis, the shortest if need be; and take the room. */
-static void tpc_take_room(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c, tpc_seat *seat) {
+   the end of its axis, the shortest if need be; and take the room. A branch does not bend about the stem
+   from which it comes. One that has no room even to begin is refused: returns 0. */
+static int tpc_take_room(tpc_growth *g, const tpc_bud *bud, int is_first, int is_refusable,
+                         treepieces_choice *c, tpc_seat *seat) {
     static const float turns[] = {0.4f, 0.9f, 1.8f}; /* tangents, of further and further aside */
     enum { TURNS = sizeof turns / sizeof turns[0] };
     const treepieces_choice chosen = *c;
     tpc_limb limb;
     float away[3];
-    for (int t = 0; tpc_is_in_the_way(g, bud, c, seat, &limb, away); t++) {
-        if (t == TURNS) {
+    for (int t = 0;; t++) {
+        const int32_t other = tpc_find_obstacle(g, bud, c, seat, &limb, away);
+        if (other < 0) break;
+        if (t == TURNS || tpc_is_own_stem(g, bud, is_first, other)) {
+            if (is_refusable) return 0;
             *c = chosen;
             if (c->type != TREEPIECES_TIP) tpc_end_axis(g, bud, c);
             c->length = tpc_shortest(TREEPIECES_TIP) * bud->radius;
-            tpc_seat_piece(bud, c, seat);
+            tpc_seat_piece(g, bud, c, seat);
             tpc_limb_of(g, bud, c, seat, &limb);
             break;
         }
         tpc_unit_or_up(away);
         for (int k = 0; k < 3; k++) c->direction[k] = bud->heading[k] + turns[t] * away[k];
     }
-    const int has_branch = c->type == TREEPIECES_SIDE || c->type == TREEPIECES_PLANAR;
-    if (has_branch && bud->parent >= 0 && tpc_is_branch_blocked(g, bud, c, seat)) c->type = TREEPIECES_I;
     tpc_space_add(&g->space, &limb);
+    return 1;
 }
 
-/* Grow one tree. Every open rim needs at least one more piece, so near the limit they all get tips. */
-static void tpc_grow(tpc_growth *g) {
-    tpc_begin_tree(g);
-    const int is_crowded =
-        g->species->clearance > 0 && g->desc->rule == TREEPIECES_GRAMMAR && !g->desc->own_rule;
-    while (g->waiting && g->status == TXM_OK) {
-        const tpc_bud *bud = tpc_pop(g);
-        treepieces_choice choice;
-        tpc_seat seat;
+/* The leaf rim where the axis goes on: that on it, or the thickest. */
+static int tpc_main_rim(const tpc_growth *g, const treepieces_choice *c) {
+    int thickest = 0;
+    if (g->kit->offsets[c->type][0] < 0.3f) return 0;
+    for (int k = 1; k < g->kit->pieces[c->type].leaf_count; k++)
+        if (c->ratios[k] > c->ratios[thickest]) thickest = k;
+    return thickest;
+}
+
+/* Append a segment; the branches that may begin at it wait for their turn. */
+static void tpc_append_segment(tpc_growth *g, const tpc_bud *bud, const treepieces_choice *c,
+                               const tpc_seat *seat) {
+    tpc_sketch *s = &g->sketch;
+    const int32_t at = s->segment_count++;
+    const int leaves = g->kit->pieces[c->type].leaf_count;
+    TXM_ASSERT(s->segment_count <= g->most_segments);
+    tpc_segment *t = &s->segments[at];
+    t->seed = bud->seed;
+    memcpy(t->position, bud->position, sizeof t->position);
+    memcpy(t->rotation, seat->rotation, sizeof t->rotation);
+    memcpy(t->stem, seat->stem, sizeof t->stem);
+    t->radius = bud->radius;
+    t->length = c->length;
+    t->longest = tpc_tallest(g, bud->radius, TREEPIECES_I) * bud->radius * txm_maxf(0.8f, 120 / (float)g->most);
+    t->part = c->length;
+    if (tpc_bears_branches(s, c->type)) {
+        const float part = tpc_tallest(g, bud->radius, c->type) * bud->radius;
+        if (t->length > part + bud->radius) t->part = part;
+    }
+    memcpy(t->ratios, c->ratios, sizeof t->ratios);
+    t->along = bud->along;
+    t->axis_length = bud->length;
+    t->step = bud->step;
+    t->end_radius = bud->end_radius;
+    t->axis = s->axis_count - 1;
+    t->depth = bud->depth;
+    t->type = (uint8_t)c->type;
+    t->order = bud->order;
+    t->is_forked = bud->is_forked;
+    t->leaves = c->leaves != 0;
+    t->main = (uint8_t)tpc_main_rim(g, c);
+    t->grown = 0;
+    s->axes[t->axis].end = s->segment_count;
+    t->begins = (uint8_t)tpc_run_take(s, &g->run, t);
+    s->pieces += t->begins;
+    if (!tpc_is_elastic(s, c->type) && leaves) s->pieces += leaves - 1; /* each has a tip at least */
+    tpc_cast_shade(g, bud->position);
+    for (int k = 0; k < 3; k++) {
+        const float end = t->position[k] + t->length * t->stem[k];
+        if (end < g->low[k]) g->low[k] = end;
+        if (end > g->high[k]) g->high[k] = end;
+    }
+}
+
+/* Grow the axis that begins with the bud, at the price of so many pieces to begin with. */
+static void tpc_grow_axis(tpc_growth *g, tpc_bud *bud, int price, int is_refusable) {
+    tpc_sketch *s = &g->sketch;
+    const int is_crowded = g->species->clearance > 0 && !s->is_rigid;
+    treepieces_choice choice;
+    tpc_seat seat;
+    int is_first = 1;
+    const int32_t first = s->segment_count;
+    g->run.first = NULL;
+    do {
         tpc_draw_for(g, bud->seed, TPC_ATTACHING);
         tpc_choose(g, bud, &choice);
         if (g->desc->own_rule && !tpc_call_rule(g, bud, &choice)) return;
         const int leaves = g->kit->pieces[choice.type].leaf_count;
-        const int is_full = leaves && g->node_count + 1 + g->waiting + leaves > g->most;
-        if (is_full) tpc_end_axis(g, bud, &choice);
-        if (is_crowded) tpc_take_room(g, bud, &choice, &seat);
-        else tpc_seat_piece(bud, &choice, &seat);
-        const float left = (1 - bud->along) * bud->length;
-        tpc_attach(g, bud, &choice, &seat);
-        if (is_full && choice.leaves) /* its cloud represents the whole pruned branch */
-            g->clusters[g->cluster_count - 1].radius *=
-                txm_clampf(0.35f * left / (g->species->cloud * g->scale), 1, 1.8f);
+        const int tips = tpc_is_elastic(s, choice.type) ? 1 : leaves;
+        if (leaves && s->pieces + (is_first ? price : 0) + 1 + tips > g->most) tpc_end_axis(g, bud, &choice);
+        if (!is_crowded) tpc_seat_piece(g, bud, &choice, &seat);
+        else if (!tpc_take_room(g, bud, is_first, is_first && is_refusable, &choice, &seat)) return;
+        if (is_first) {
+            tpc_axis *axis = &s->axes[s->axis_count++];
+            TXM_ASSERT(s->axis_count <= g->most);
+            axis->first = s->segment_count;
+            axis->parent = bud->parent;
+            axis->rim = bud->rim;
+            s->pieces += price;
+            if (bud->parent >= 0) {
+                tpc_split(s, bud->parent, 1);
+                s->segments[bud->parent].grown |= (uint8_t)(1 << bud->rim);
+            }
+            is_first = 0;
+        }
+        tpc_append_segment(g, bud, &choice, &seat);
+        if (!g->kit->pieces[choice.type].leaf_count) break;
+        const tpc_segment *t = &s->segments[s->segment_count - 1];
+        bud->roll = seat.after;
+        tpc_open_rim(g, s->segment_count - 1, t->main, bud);
+        if (choice.type == TREEPIECES_SIDE || choice.type == TREEPIECES_PLANAR)
+            bud->roll = seat.after + tpc_order(g, t->order + 1)->roll; /* of the next branch */
+    } while (g->status == TXM_OK);
+    int number = 0;
+    for (int32_t i = first; i < s->segment_count; i++) {
+        const int leaves = g->kit->pieces[s->segments[i].type].leaf_count;
+        for (int k = 0; k < leaves; k++)
+            if (k != s->segments[i].main) tpc_wait_for_axis(g, i, k, number);
+        number += leaves > 1;
     }
+}
+
+/* Sketch one tree: axis after axis, until the limit is reached. Leaf rims of pieces that lose none need
+   at least a tip. */
+static void tpc_grow(tpc_growth *g) {
+    tpc_sketch *s = &g->sketch;
+    tpc_bud bud;
+    int is_full = 0;
+    tpc_begin_tree(g, &bud);
+    tpc_grow_axis(g, &bud, 0, 0);
+    for (const tpc_wait *w; g->status == TXM_OK && (w = tpc_pop(g)) != NULL;) {
+        const int is_elastic = tpc_is_elastic(s, s->segments[w->segment].type);
+        if (is_full && is_elastic) continue;
+        const int price = tpc_split(s, w->segment, 0);
+        is_full = is_full || s->pieces + price + 2 > g->most;
+        if (is_full && is_elastic) continue;
+        memset(&bud, 0, sizeof bud);
+        tpc_open_rim(g, w->segment, w->rim, &bud);
+        tpc_grow_axis(g, &bud, price, is_elastic);
+        if (s->axis_count == TPC_FRAME && !s->is_rigid)
+            g->ceiling = g->high[1] + 0.004f * (g->high[1] - g->low[1]);
+    }
+}
+
+/* ---- assembling: pieces of the sketch ------------------------------------------------------- */
+
+enum { TPC_CLASSES = 16 }; /* of oscillators */
+
+/* A piece to be placed on a rim. */
+typedef struct tpc_part {
+    const tpc_segment *first; /* of those that it stands for */
+    int type;
+    float radius, ratio, length; /* ratio: of its stem's radius above to that below */
+    float foliage;               /* clouds that it stands for */
+} tpc_part;
+
+/* Word 3 of a record: log2 of the number of tiles along and across the quads of each band. Where tiles
+   would be too narrow, the number across is halved. across: its log2 below; receives that above. */
+static uint32_t tpc_bands(const tpc_growth *g, const tpc_part *part, int *across) {
+    static const uint8_t halvable[TREEPIECES_BUILTIN] = {3, 1, 1, 1, 1, 0, 2};
+    const float tile = tpc_tile_width * g->foot;
+    const tpc_band *band = g->kit->bands[part->type];
+    const int may = part->type < TREEPIECES_BUILTIN ? halvable[part->type] : 0;
+    int now = *across;
+    uint32_t word = 0;
+    for (int b = 0; b < g->kit->band_counts[part->type]; b++) {
+        /* the stem's radius above the band; bands of branches begin as wide as band 0 ends */
+        const float share = part->type == TREEPIECES_I && b == 0 ? 0.5f : 1;
+        const float radius = part->radius * (1 + (part->ratio - 1) * share);
+        int halve = 0;
+        const int is_as_before = b == 1 && part->type != TREEPIECES_I && part->type != TREEPIECES_FLARE;
+        const float least = tpc_halving_width * tile * (float)(1 << now);
+        if (!is_as_before && (may >> b & 1) && now > 0 && radius < least) {
+            halve = 1;
+            now--;
+        }
+        const float width = part->radius / (float)(1 << now);
+        const float dy = band[b].rise * part->length, dr = band[b].spread * part->radius;
+        const float height = sqrtf(dy * dy + dr * dr);
+        int along = 0;
+        while (along < 3 && height > 1.41f * width * (float)(1 << along)) along++;
+        word |= (uint32_t)(now | along << 3 | halve << 5) << (8 * b);
+    }
+    *across = now;
+    return word;
+}
+
+/* The multiple of 60 degrees about y that is nearest to a rotation, as 0..5. */
+static int tpc_nearest_turn(const float q[4]) {
+    int best = 0;
+    float most = -1;
+    for (int k = 0; k < TREEPIECES_RIM; k++) {
+        const float match = fabsf(q[1] * tpc_turns[k][1] + q[3] * tpc_turns[k][3]);
+        if (match > most + 1e-6f) {
+            most = match;
+            best = k;
+        }
+    }
+    return best;
+}
+
+/* How many clouds belong to a segment: its own, and those of the branches that have not grown there. */
+static float tpc_foliage(const tpc_growth *g, const tpc_segment *t) {
+    float clouds = t->leaves, out[3];
+    if (!(g->species->leaf_count > 0)) return 0;
+    if (t->type == TREEPIECES_TIP) /* all that would have grown there */
+        return clouds * txm_maxf(1, 0.125f * (1 - t->along) * t->axis_length / (g->species->cloud * g->scale));
+    if (!tpc_is_elastic(&g->sketch, t->type)) return clouds;
+    for (int k = 0; k < g->kit->pieces[t->type].leaf_count; k++) {
+        const int order = t->order + !tpc_is_fork(t->type);
+        if (k == t->main || (t->grown >> k & 1) || !(tpc_order(g, order)->leaves > 0)) continue;
+        tpc_find_out(g, t, k, out);
+        clouds += 0.5f * tpc_expect_length(g, t, out) / (g->species->cloud * g->scale);
+    }
+    return clouds;
+}
+
+/* The clouds of a piece as one. */
+static void tpc_add_cluster(tpc_growth *g, const tpc_part *part) {
+    const tpc_segment *t = part->first;
+    TXM_ASSERT(g->cluster_count < g->most);
+    treepieces_cluster *c = &g->clusters[g->cluster_count++];
+    tpc_draw_for(g, t->seed, TPC_LEAFING);
+    c->node = (uint32_t)(g->node_count - 1);
+    c->along = part->type == TREEPIECES_TIP ? 0.7f : tpc_uniform(g, 0.2f, 1);
+    c->radius = g->species->cloud * g->scale * tpc_uniform(g, 0.75f, 1.2f);
+    c->look = txm_rng_next(&g->rng);
+    c->radius *= txm_clampf(sqrtf(part->foliage), 1, 1.8f);
+}
+
+/* Append a piece: parent is the node below, rotation that of its rim in the world, and joint the
+   rotation of the piece from there. */
+static void tpc_append_node(tpc_growth *g, const tpc_part *part, int32_t parent, int rim,
+                            const float joint[4], int turn, int *across) {
+    TXM_ASSERT(g->node_count < g->most);
+    treepieces_node *node = &g->nodes[g->node_count];
+    /* node rotations are relative to the parent, rim frames include the building rotation */
+    if (parent >= 0)
+        tpc_multiply_building(g->kit->pieces[g->nodes[parent].type].building[rim].rotation, joint,
+                              node->rotation);
+    else memcpy(node->rotation, joint, sizeof node->rotation);
+    node->radius = part->radius;
+    node->length = part->length;
+    node->parent = parent;
+    node->type = (uint8_t)part->type;
+    node->joint = (uint8_t)(rim * 8 + turn);
+    node->order = part->first->order;
+    /* the thinner the faster: two classes per octave, plus one at random */
+    const int sway = (int)(tpc_float_bits(g->foot) >> 22) - (int)(tpc_float_bits(part->radius) >> 22) +
+                     (int)(txm_hash(part->first->seed) >> 63);
+    node->sway = (uint8_t)txm_clampi(sway, 0, TPC_CLASSES - 1);
+    g->bands[g->node_count] = tpc_bands(g, part, across);
+    g->type_counts[part->type]++;
+    g->node_count++;
+    g->height = txm_maxf(g->height, part->first->position[1] - g->place.position[1]);
+    if (part->foliage > 0) tpc_add_cluster(g, part);
+}
+
+/* The kind of piece that a segment with some of its branches is; seen from the other side, if only the
+   second branch of a pair has grown. */
+static void tpc_reduce(const tpc_sketch *s, tpc_segment *t) {
+    static const float half_turn[4] = {0, 1, 0, 0};
+    if (!tpc_is_elastic(s, t->type) || t->type != TREEPIECES_PLANAR || t->grown == 6) return;
+    t->type = TREEPIECES_SIDE;
+    if (t->grown == 2) return;
+    tpc_multiply(t->rotation, half_turn, t->rotation);
+    t->ratios[1] = t->ratios[2];
+}
+
+/* Make the pieces of one axis. */
+static void tpc_assemble_axis(tpc_growth *g, const tpc_axis *axis) {
+    tpc_sketch *s = &g->sketch;
+    int32_t parent = TREEPIECES_NONE;
+    int rim = axis->rim, across = 4;
+    float frame[4] = {0, 0, 0, 1}; /* of the rim where the next piece sits */
+    if (axis->parent >= 0) {
+        const tpc_segment *from = &s->segments[axis->parent];
+        parent = from->node;
+        if (rim >= g->kit->pieces[from->type].leaf_count) rim = 1;
+        across = from->across;
+        tpc_multiply_by_building(from->rotation, g->kit->pieces[from->type].building[rim].rotation, frame);
+    }
+    for (int32_t i = axis->first, end; i < axis->end; i = end) {
+        tpc_segment *t = &s->segments[i];
+        tpc_part part = {t, t->type, t->radius, t->ratios[t->main], t->length, tpc_foliage(g, t)};
+        const float back[4] = {-frame[0], -frame[1], -frame[2], frame[3]};
+        const float up[3] = {0, 1, 0};
+        float rotation[4], joint[4], y[3];
+        int turn;
+        for (end = i + 1; end < axis->end && !s->segments[end].begins; end++)
+            part.foliage += tpc_foliage(g, &s->segments[end]);
+        if (tpc_is_plain(s, t)) {
+            const tpc_segment *next = &s->segments[end];
+            float chord[3];
+            tpc_rotate(frame, up, y);
+            for (int k = 0; k < 3; k++) chord[k] = next->position[k] - t->position[k];
+            part.type = TREEPIECES_I;
+            part.length = sqrtf(tpc_dot(chord, chord));
+            part.ratio = next->radius / t->radius;
+            for (int k = 0; k < 3; k++) chord[k] /= part.length;
+            turn = (int)((t->seed >> 32) % TREEPIECES_RIM);
+            tpc_turn_to(y, chord, frame, rotation);
+            tpc_multiply(rotation, tpc_turns[turn], rotation);
+            tpc_multiply(back, rotation, joint);
+        } else {
+            tpc_reduce(s, t);
+            part.type = t->type;
+            part.length = t->part;
+            if (t->part < t->length) part.ratio = 1 + (part.ratio - 1) * t->part / t->length;
+            memcpy(rotation, t->rotation, sizeof rotation);
+            tpc_multiply(back, rotation, joint);
+            turn = tpc_nearest_turn(joint);
+        }
+        tpc_append_node(g, &part, parent, rim, joint, turn, &across);
+        t->node = parent = g->node_count - 1;
+        t->across = (uint8_t)across;
+        if (part.length < t->length && part.type != TREEPIECES_I) { /* and the rest of its stem */
+            static const float straight[4] = {0, 0, 0, 1};
+            part.type = TREEPIECES_I;
+            part.radius *= part.ratio;
+            part.ratio = t->radius * t->ratios[0] / part.radius;
+            part.length = t->length - t->part;
+            part.foliage = 0;
+            tpc_append_node(g, &part, parent, 0, straight, 0, &across);
+            parent++;
+        }
+        rim = part.type == TREEPIECES_I ? 0 : t->main;
+        if (end < axis->end)
+            tpc_multiply_by_building(rotation, g->kit->pieces[part.type].building[rim].rotation, frame);
+    }
+}
+
+/* Make the pieces of the sketch: axis after axis, so parents come first. */
+static void tpc_assemble(tpc_growth *g) {
+    for (int i = 0; i < g->sketch.axis_count && g->status == TXM_OK; i++)
+        tpc_assemble_axis(g, &g->sketch.axes[i]);
+    TXM_ASSERT(g->status != TXM_OK || g->node_count == g->sketch.pieces);
 }
 
 /* ---- modes of swaying ---------------------------------------------------------------------- */
@@ -3325,6 +3807,7 @@ static void tpc_grow_slot(void *context, int i) {
     g->place = p->desc->places ? p->desc->places[g->index] : tpc_scatter(p->desc, p->spacing, g->index);
     g->species = &p->desc->species[g->place.species];
     tpc_grow(g);
+    tpc_assemble(g);
 }
 
 static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
@@ -3339,14 +3822,19 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->desc = p->desc;
         g->kit = p->desc->kit;
         g->most = most;
-        /* a tree has at most `most` nodes; each was a bud once, and has one cluster at most */
+        g->most_segments = most * tpc_most_joined(tpc_stretch(most));
+        /* a tree has at most `most` nodes, each of some segments and with one cluster at most */
         g->nodes = (treepieces_node *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->nodes);
         g->bands = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->bands);
         g->records = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->records);
-        g->buds = (tpc_bud *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->buds);
+        const size_t segments = (size_t)g->most_segments;
+        g->sketch.axes = (tpc_axis *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->sketch.axes);
+        g->sketch.segments = (tpc_segment *)txm_arena_alloc(&p->scratch, segments, sizeof *g->sketch.segments);
+        g->waits = (tpc_wait *)txm_arena_alloc(&p->scratch, segments * (TREEPIECES_MAX_LEAVES - 1),
+                                               sizeof *g->waits);
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
-        if (!tpc_space_make(&g->space, most, &p->scratch))
+        if (!tpc_space_make(&g->space, g->most_segments, &p->scratch))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     }
     return TXM_OK;

@@ -73,8 +73,10 @@
      pose opens a gap or shows a crease. A child can be attached in six rotations. Each piece has
      one bone of its own, which scales it across and along the stem; its leaf rims follow the bones
      of its children, all in one buffer [1, 4.1 to 4.3].
-     Open rims get their pieces in order of decreasing radius, so that a limit on the number of
-     pieces thins out the twigs and keeps the shape of the tree: this is the coarse level of detail.
+     A tree is sketched axis by axis, the longest and outermost first, each to its end, until a limit on
+     the number of pieces is reached; then pieces are made of the sketch. Where a branch was not reached a
+     fork is a tube, and in trees of few pieces tubes in a row become one. So trees of any limit have one
+     skeleton, of which small ones lack the twigs: this is the coarse level of detail.
      The fine one is tessellation by distance, symmetric along each edge [1, 4.4]. Wind is a sum of
      gusts that travel across the land; each joint responds as a damped oscillator, solved exactly
      over each time step. The joints of an axis swing together: the trunk with the gusts, about 3
@@ -88,11 +90,12 @@
 
    MEMORY
      A forest takes about 60 bytes per piece; bones and sway state, which the caller owns, take 64
-     more: 20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. Growing takes 400
-     more bytes for each piece of the 64 trees that grow at a time, which are released afterwards.
+     more: 20 KB for a tree of 4,000 triangles. treepieces_forest.bytes is exact. Growing takes up to 1,500
+     more bytes for each piece of the 64 trees that grow at a time, 4,000 with few pieces, which are
+     released afterwards.
 
    TIME   (one core of 2023; make bench measures yours)
-     About 0.4 microseconds to grow a piece that keeps clear of others, 0.15 without clearance, if the
+     About 0.5 microseconds to grow a piece that keeps clear of others, 0.35 without clearance, if the
      memory was in use before (first access to fresh memory takes as long again), 0.06 to move its bone in the wind. The parallel-for hook
      distributes trees.
 
@@ -416,8 +419,8 @@ typedef struct treepieces_forest_desc {
                                        with random species and sizes                              */
     int tree_count;
     float spacing;  /* of that grid, metres; 0 = 0.6 times the trunk length of the tallest species */
-    int max_pieces; /* per tree, 8..65535; 0 = 600. The thickest grow first, so that fewer pieces
-                       make a sparser tree of the same shape                                      */
+    int max_pieces; /* per tree, 8..65535; 0 = 600. The most important axes grow first: trees of
+                       the same seed and fewer pieces are sparser, with the same height and shape */
     int rule;       /* treepieces_rule                                                            */
     treepieces_rule_function *own_rule; /* NULL, or called for each open rim                      */
     void *own_user; /* its first argument                                                         */
@@ -746,7 +749,11 @@ TREEPIECES_API txm_status treepieces_bake_leaves(const treepieces_forest *forest
 #include "treepieces/presets.h"
 #include "treepieces/text.h"
 #include "treepieces/space.h"
+#include "treepieces/sketch.h"
 #include "treepieces/grow.h"
+#include "treepieces/branch.h"
+#include "treepieces/axes.h"
+#include "treepieces/assemble.h"
 #include "treepieces/modes.h"
 #include "treepieces/forest.h"
 #include "treepieces/wind.h"

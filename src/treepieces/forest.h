@@ -2,7 +2,7 @@
 #define TREEPIECES_FOREST_H
 
 #include "species.h"
-#include "grow.h"
+#include "assemble.h"
 #include "modes.h"
 
 /* ---- a forest ------------------------------------------------------------------------------ */
@@ -75,6 +75,7 @@ static void tpc_grow_slot(void *context, int i) {
     g->place = p->desc->places ? p->desc->places[g->index] : tpc_scatter(p->desc, p->spacing, g->index);
     g->species = &p->desc->species[g->place.species];
     tpc_grow(g);
+    tpc_assemble(g);
 }
 
 static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
@@ -89,14 +90,19 @@ static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
         g->desc = p->desc;
         g->kit = p->desc->kit;
         g->most = most;
-        /* a tree has at most `most` nodes; each was a bud once, and has one cluster at most */
+        g->most_segments = most * tpc_most_joined(tpc_stretch(most));
+        /* a tree has at most `most` nodes, each of some segments and with one cluster at most */
         g->nodes = (treepieces_node *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->nodes);
         g->bands = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->bands);
         g->records = (uint32_t *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->records);
-        g->buds = (tpc_bud *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->buds);
+        const size_t segments = (size_t)g->most_segments;
+        g->sketch.axes = (tpc_axis *)txm_arena_alloc(&p->scratch, (size_t)most, sizeof *g->sketch.axes);
+        g->sketch.segments = (tpc_segment *)txm_arena_alloc(&p->scratch, segments, sizeof *g->sketch.segments);
+        g->waits = (tpc_wait *)txm_arena_alloc(&p->scratch, segments * (TREEPIECES_MAX_LEAVES - 1),
+                                               sizeof *g->waits);
         g->clusters = (treepieces_cluster *)txm_arena_alloc(&p->scratch, (size_t)most,
                                                             sizeof *g->clusters);
-        if (!tpc_space_make(&g->space, most, &p->scratch))
+        if (!tpc_space_make(&g->space, g->most_segments, &p->scratch))
             return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to grow trees");
     }
     return TXM_OK;

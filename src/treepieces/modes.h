@@ -1,7 +1,7 @@
 #ifndef TREEPIECES_MODES_H
 #define TREEPIECES_MODES_H
 
-#include "grow.h"
+#include "assemble.h"
 
 /* ---- modes of swaying ---------------------------------------------------------------------- */
 

@@ -13,8 +13,19 @@ enum {
 typedef struct tpc_limb {
     float from[3], to[3];
     float radius, end; /* at its ends, metres */
-    int32_t parent;    /* of its node         */
+    int32_t parent;    /* of its segment      */
+    float middle[3], half; /* half its length */
 } tpc_limb;
+
+/* Set the middle of a limb and half its length. */
+static void tpc_limb_measure(tpc_limb *limb) {
+    float half[3];
+    for (int k = 0; k < 3; k++) {
+        half[k] = 0.5f * (limb->to[k] - limb->from[k]);
+        limb->middle[k] = limb->from[k] + half[k];
+    }
+    limb->half = sqrtf(tpc_dot(half, half));
+}
 
 /* A stem in a cell. */
 typedef struct tpc_entry {
@@ -125,11 +136,6 @@ static float tpc_nearest(const tpc_limb *a, const tpc_limb *b, float *along_a, f
 /* Do the stems come nearer to each other than `clearance` times the sum of their radii there? along:
    receives how far along the axis of `a`, metres. */
 static int tpc_limbs_touch(const tpc_limb *a, const tpc_limb *b, float clearance, float *along, float away[3]) {
-    const float reach = clearance * (txm_maxf(a->radius, a->end) + txm_maxf(b->radius, b->end));
-    for (int k = 0; k < 3; k++) { /* boxes apart: the usual case */
-        if (txm_minf(a->from[k], a->to[k]) - txm_maxf(b->from[k], b->to[k]) > reach) return 0;
-        if (txm_minf(b->from[k], b->to[k]) - txm_maxf(a->from[k], a->to[k]) > reach) return 0;
-    }
     float s, t, square = tpc_nearest(a, b, &s, &t, away);
     const float radii = txm_lerpf(a->radius, a->end, s) + txm_lerpf(b->radius, b->end, t);
     if (square >= clearance * clearance * radii * radii) return 0;
@@ -153,15 +159,21 @@ static int tpc_is_kin(const tpc_space *s, int32_t parent, int32_t other) {
 static int tpc_limb_hits(const tpc_space *s, const tpc_limb *limb, int32_t other, float clearance,
                          float fork, float away[3]) {
     const int32_t up = limb->parent;
+    const tpc_limb *b = &s->limbs[other];
+    const float between[3] = {limb->middle[0] - b->middle[0], limb->middle[1] - b->middle[1],
+                              limb->middle[2] - b->middle[2]};
+    const float thick = txm_maxf(limb->radius, limb->end) + txm_maxf(b->radius, b->end);
+    const float reach = limb->half + b->half + clearance * thick;
+    if (tpc_dot(between, between) > reach * reach) return 0; /* the usual case */
     float along;
     if (other == up || other == s->limbs[up].parent || s->limbs[other].parent == up) return 0;
     return tpc_limbs_touch(limb, &s->limbs[other], clearance, &along, away) &&
            (along > fork || !tpc_is_kin(s, up, other));
 }
 
-/* Does the stem of a node with a parent, not yet added, come too near to one of the others? away:
+/* The number of a stem to which one with a parent, not yet added, comes too near, or TREEPIECES_NONE. away:
    receives the direction out of it, not normalized. fork: see tpc_limb_hits. */
-static int tpc_space_touches(tpc_space *s, const tpc_limb *limb, float clearance, float fork, float away[3]) {
+static int32_t tpc_space_touches(tpc_space *s, const tpc_limb *limb, float clearance, float fork, float away[3]) {
     int least[3], most[3];
     tpc_limb wide = *limb;
     wide.radius *= clearance;
@@ -169,17 +181,17 @@ static int tpc_space_touches(tpc_space *s, const tpc_limb *limb, float clearance
     const int cells = tpc_space_range(s, &wide, least, most);
     if (cells > TPC_SPACE_CELLS) { /* rare: look at all */
         for (int32_t i = 0; i < s->limb_count; i++)
-            if (tpc_limb_hits(s, limb, i, clearance, fork, away)) return 1;
-        return 0;
+            if (tpc_limb_hits(s, limb, i, clearance, fork, away)) return i;
+        return TREEPIECES_NONE;
     }
     for (int32_t e = s->long_ones; e >= 0; e = s->entries[e].next)
-        if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return 1;
+        if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return s->entries[e].limb;
     for (int x = least[0]; x <= most[0]; x++)
         for (int y = least[1]; y <= most[1]; y++)
             for (int z = least[2]; z <= most[2]; z++)
                 for (int32_t e = *tpc_space_head(s, x, y, z); e >= 0; e = s->entries[e].next)
-                    if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return 1;
-    return 0;
+                    if (tpc_limb_hits(s, limb, s->entries[e].limb, clearance, fork, away)) return s->entries[e].limb;
+    return TREEPIECES_NONE;
 }
 
 #endif /* TREEPIECES_SPACE_H */

@@ -176,7 +176,7 @@ class Tree(Glb):
                 need(abs(sum(x * x for x in q) - 1) < 1e-5, "a key of %d is no unit quaternion" % node)
             steps = [distance(a, b) for a, b in zip(turns, turns[1:])]
             need(turns[0] == turns[-1], "the last key of %d is not the first" % node)
-            need(max(steps) < 0.3, "the keys of %d jump" % node)
+            need(max(steps) < 0.45, "the keys of %d jump" % node)
             bends = [max(abs(a[k] - 2 * b[k] + c[k]) for k in range(4))
                      for a, b, c in zip(turns, turns[1:], turns[2:])]
             seam = max(abs(turns[-2][k] - 2 * turns[0][k] + turns[1][k]) for k in range(4))

@@ -119,42 +119,83 @@ static void test_branches_keep_apart(void **state) {
 
 /* ---- fewer pieces --------------------------------------------------------------------------- */
 
-/* All pieces of a small tree but its tips are pieces of the large one of the same seed. */
-static void test_fewer_are_a_part(void **state) {
+/* The height of the highest place, and how far the tree reaches along x and z on average. */
+static void measure(const treepieces_forest *f, const cone *cones, double *height, double *width) {
+    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+    for (uint32_t i = 0; i < f->node_count; i++)
+        for (int k = 0; k < 3; k++) {
+            const double end = cones[i].from[k] + cones[i].along[k];
+            low[k] = fmin(low[k], end);
+            high[k] = fmax(high[k], end);
+        }
+    *height = high[1];
+    *width = 0.5 * (high[0] - low[0] + high[2] - low[2]);
+}
+
+/* The share of a small tree's joints that lie near a stem of the large one. */
+static double share_near(const treepieces_forest *f, const cone *cones, const treepieces_forest *large,
+                         const cone *others, double near_by) {
+    size_t found = 0;
+    for (uint32_t i = 0; i < f->node_count; i++) {
+        int is_near = 0;
+        for (uint32_t j = 0; j < large->node_count && !is_near; j++)
+            is_near = distance_at(&cones[i], 0, &others[j], project(&others[j], &cones[i], 0)) < near_by;
+        found += (size_t)is_near;
+    }
+    return (double)found / f->node_count;
+}
+
+/* Trees of the same seed and fewer pieces have the same height and the same branches, as far as they have
+   them. */
+static void test_one_skeleton(void **state) {
     (void)state;
+    static const int limits[] = {60, 120, 300, 600};
+    enum { LIMITS = sizeof limits / sizeof *limits };
+    const int seeds = tk_full() ? 10 : 2;
+    double wide = 0, narrow = 0, apart = 0, worst = 0;
+    int too_high = 0, trees = 0;
     for (int i = 0; i < treepieces_preset_count(); i++) {
         treepieces_species s;
         const char *text = treepieces_preset_text(i);
         assert_int_equal(treepieces_species_parse(text, strlen(text), NULL, &s), TXM_OK);
-        s.clearance = 0; /* or a branch that was left out leaves room for others */
-        treepieces_forest_desc d = describe(1, 1500);
-        d.species = &s;
-        treepieces_forest *large = grow(&d);
-        float *all = make_bones(large, NULL);
-        for (int most = 40; most <= 640; most *= 4) {
-            d.max_pieces = most;
-            treepieces_forest *small_one = grow(&d);
-            float *bones = make_bones(small_one, NULL);
-            for (uint32_t n = 0; n < small_one->node_count; n++) {
-                int found = small_one->nodes[n].type == TREEPIECES_TIP;
-                for (uint32_t m = 0; m < large->node_count && !found; m++)
-                    found = small_one->nodes[n].type == large->nodes[m].type &&
-                            !memcmp(bones + TREEPIECES_BONE * n, all + TREEPIECES_BONE * m,
-                                    TREEPIECES_BONE * sizeof *bones);
-                assert_true(found);
+        for (int seed = 0; seed < seeds; seed++) {
+            treepieces_forest_desc d = describe(1, 1200);
+            double height, width;
+            d.species = &s;
+            d.seed = 1 + (uint64_t)seed;
+            treepieces_forest *large = grow(&d);
+            cone *others = make_cones(large);
+            measure(large, others, &height, &width);
+            for (int l = 0; l < LIMITS; l++, trees++) {
+                double small_height, small_width;
+                d.max_pieces = limits[l];
+                treepieces_forest *f = grow(&d);
+                cone *cones = make_cones(f);
+                measure(f, cones, &small_height, &small_width);
+                assert_true((int)f->node_count <= limits[l]);
+                worst = fmax(worst, fabs(small_height / height - 1));
+                too_high += fabs(small_height / height - 1) > 0.02;
+                if (limits[l] >= 300) wide += small_width, narrow += width;
+                apart = fmax(apart, 1 - share_near(f, cones, large, others, 0.05 * height));
+                free(cones);
+                treepieces_forest_free(f);
             }
-            free(bones);
-            treepieces_forest_free(small_one);
+            free(others);
+            treepieces_forest_free(large);
         }
-        free(all);
-        treepieces_forest_free(large);
     }
+    printf("height: %d of %d trees differ by more than 2 %%, at most by %.1f %%; width from 300 pieces on %.2f; "
+           "joints elsewhere at most %.1f %%\n",
+           too_high, trees, 100 * worst, wide / narrow, 100 * apart);
+    assert_true(20 * too_high <= trees);
+    assert_true(wide > 0.9 * narrow);
+    assert_true(apart < 0.02);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_branches_keep_apart),
-        cmocka_unit_test(test_fewer_are_a_part),
+        cmocka_unit_test(test_one_skeleton),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
