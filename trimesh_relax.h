@@ -5395,27 +5395,39 @@ static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, in
                              txm_dvec3 *a, txm_dvec3 *b) {
     const double spacing = 0.5 * (level->scale[i] + (double)level->scale[j]);
     const txm_dvec3 middle = tmr_between(level->p[i], level->n[i], level->p[j], level->n[j]);
-    txm_dvec3 corner[2][4];
-    double least = -1;
+    txm_dvec3 from[2], x[2], y[2]; /* each has four lattice points around the middle: a rhombus */
     for (int side = 0; side < 2; side++) {
         const int32_t v = side ? j : i;
-        const txm_dvec3 q = side ? level->q[j] : qi, x = level->x[v], y = tmr_arm(level->n[v], x);
+        const txm_dvec3 q = side ? level->q[j] : qi, arm = tmr_arm(level->n[v], level->x[v]);
         double s, t;
-        tmr_lattice_at(txm_d3_sub(middle, q), x, y, 1 / spacing, &s, &t);
-        s = floor(s);
-        t = floor(t);
-        corner[side][0] = txm_d3_mad(txm_d3_mad(q, x, s * spacing), y, t * spacing);
-        corner[side][1] = txm_d3_mad(corner[side][0], x, spacing);
-        corner[side][2] = txm_d3_mad(corner[side][0], y, spacing);
-        corner[side][3] = txm_d3_mad(corner[side][1], y, spacing);
+        tmr_lattice_at(txm_d3_sub(middle, q), level->x[v], arm, 1 / spacing, &s, &t);
+        x[side] = txm_d3_scale(level->x[v], spacing);
+        y[side] = txm_d3_scale(arm, spacing);
+        from[side] = txm_d3_mad(txm_d3_mad(q, x[side], floor(s)), y[side], floor(t));
     }
-    for (int k = 0; k < 16; k++) {
-        const double d = txm_d3_dist2(corner[0][k & 3], corner[1][k >> 2]);
-        if (least >= 0 && d >= least) continue;
-        least = d;
-        *a = corner[0][k & 3];
-        *b = corner[1][k >> 2];
+    /* squared distances, less that of the first pair: |d + p - r|^2 - |d|^2 = (p + 2 d) p + (r - 2 d) r
+       - 2 p r, where p and r are 0, x, y or x + y of either side */
+    const txm_dvec3 d = txm_d3_sub(from[0], from[1]);
+    const double unit = spacing * spacing;
+    const double dx[2] = {2 * txm_d3_dot(d, x[0]), -2 * txm_d3_dot(d, x[1])};
+    const double dy[2] = {2 * txm_d3_dot(d, y[0]), -2 * txm_d3_dot(d, y[1])};
+    const double xx = 2 * txm_d3_dot(x[0], x[1]), xy = 2 * txm_d3_dot(x[0], y[1]);
+    const double yx = 2 * txm_d3_dot(y[0], x[1]), yy = 2 * txm_d3_dot(y[0], y[1]);
+    const double one[4] = {0, unit + dx[0], unit + dy[0], 3 * unit + dx[0] + dy[0]};
+    const double two[4] = {0, unit + dx[1], unit + dy[1], 3 * unit + dx[1] + dy[1]};
+    const double both[4][4] = {{0, 0, 0, 0},
+                               {0, xx, xy, xx + xy},
+                               {0, yx, yy, yx + yy},
+                               {0, xx + yx, xy + yy, xx + xy + yx + yy}};
+    double least = 0;
+    int best = 0;
+    for (int k = 1; k < 16; k++) {
+        const double distance = one[k & 3] + two[k >> 2] - both[k & 3][k >> 2];
+        best = distance < least ? k : best;
+        least = distance < least ? distance : least;
     }
+    *a = txm_d3_mad(txm_d3_mad(from[0], x[0], best & 1), y[0], best >> 1 & 1);
+    *b = txm_d3_mad(txm_d3_mad(from[1], x[1], best >> 2 & 1), y[1], best >> 3);
 }
 
 static void tmr_smooth_points(tmr_level *level, int sweeps) {
