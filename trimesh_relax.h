@@ -6215,6 +6215,13 @@ typedef struct tmr_cells {
     int overflow;
 } tmr_cells;
 
+/* The cell of a coordinate. Where one vertex lies extremely far out, edges may be so short beside the
+   diagonal that cells cannot be counted; then those of the outer ones are the same. */
+static int32_t tmr_cell_at(double x, double cell) {
+    const double at = floor(x / cell);
+    return !(at > -1e9) ? -1000000000 : at < 1e9 ? (int32_t)at : 1000000000;
+}
+
 static uint32_t tmr_cell_key(int32_t x, int32_t y, int32_t z) {
     return (uint32_t)(txm_hash((uint64_t)(uint32_t)x * 0x9e3779b1u + (uint64_t)(uint32_t)y *
                                0x85ebca77u * 65537u + ((uint64_t)(uint32_t)z << 40)) >> 32);
@@ -6232,10 +6239,11 @@ static void tmr_face_box(const tmr_mesh *m, int32_t f, txm_dvec3 *low, txm_dvec3
 static void tmr_cells_add(const tmr_mesh *m, tmr_cells *g, int32_t f) {
     txm_dvec3 low, high;
     tmr_face_box(m, f, &low, &high);
-    for (int32_t x = (int32_t)floor(low.x / g->cell); x <= (int32_t)floor(high.x / g->cell); x++) {
-        for (int32_t y = (int32_t)floor(low.y / g->cell); y <= (int32_t)floor(high.y / g->cell); y++) {
-            for (int32_t z = (int32_t)floor(low.z / g->cell); z <= (int32_t)floor(high.z / g->cell);
-                 z++) {
+    const int32_t x1 = tmr_cell_at(high.x, g->cell), y1 = tmr_cell_at(high.y, g->cell);
+    const int32_t z1 = tmr_cell_at(high.z, g->cell);
+    for (int32_t x = tmr_cell_at(low.x, g->cell); x <= x1; x++) {
+        for (int32_t y = tmr_cell_at(low.y, g->cell); y <= y1; y++) {
+            for (int32_t z = tmr_cell_at(low.z, g->cell); z <= z1; z++) {
                 if (g->count == g->limit) {
                     g->overflow = 1;
                     return;
@@ -6252,8 +6260,8 @@ enum {
 }; /* coarse cells by hash: near a marked vertex?                    */
 
 static uint32_t tmr_near_key(txm_dvec3 p, double cell, int dx, int dy, int dz) {
-    return tmr_cell_key((int32_t)floor(p.x / cell) + dx, (int32_t)floor(p.y / cell) + dy,
-                        (int32_t)floor(p.z / cell) + dz) % TMR_NEAR_CELLS;
+    return tmr_cell_key(tmr_cell_at(p.x, cell) + dx, tmr_cell_at(p.y, cell) + dy,
+                        tmr_cell_at(p.z, cell) + dz) % TMR_NEAR_CELLS;
 }
 
 /* Set near for the coarse cells around the vertices marked in w->bad. */
@@ -6294,9 +6302,9 @@ static txm_status tmr_cells_make(const tmr_work *w, const uint8_t *nearby, tmr_c
 /* Is this the cell in which the boxes of two triangles, with these low corners, overlap first? There
    are others, where the pair need not be looked at again. */
 static int tmr_is_first_cell(const tmr_cells *g, uint32_t key, txm_dvec3 a, txm_dvec3 b) {
-    return key == tmr_cell_key((int32_t)floor(fmax(a.x, b.x) / g->cell),
-                               (int32_t)floor(fmax(a.y, b.y) / g->cell),
-                               (int32_t)floor(fmax(a.z, b.z) / g->cell));
+    return key == tmr_cell_key(tmr_cell_at(fmax(a.x, b.x), g->cell),
+                               tmr_cell_at(fmax(a.y, b.y), g->cell),
+                               tmr_cell_at(fmax(a.z, b.z), g->cell));
 }
 
 enum { TMR_COUNT_CROSSING, TMR_ANY_CROSSING, TMR_ANY_TOUCHING }; /* what tmr_count_crossings does */
