@@ -41,7 +41,8 @@
      only split, collapsed (under the link condition) and flipped, so its topology cannot change.
        TRIMESH_LATTICE (default): the copy is resampled to about twice the number of vertices; a
      six-fold direction field and triangular lattice points are found on a hierarchy [3]; edges whose
-     ends share a lattice point collapse. From 20,000 vertices on this is done for a quarter of the
+     ends share a lattice point collapse. Dislocations, pairs of vertices of valence five and seven, are
+     moved by local steps until they cancel or their surroundings get no better. From 20,000 vertices on this is done for a quarter of the
      number, and then each triangle is cut in four.
        TRIMESH_REPEL: the method of [1] and [2]: points sampled by area repel each other along the
      surface and replace the old vertices by mutual tessellation, which unlike the greedy
@@ -3729,7 +3730,7 @@ static txm_status tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, t
 
    The copy has one ghost vertex for each border loop and one ghost triangle for each border edge.
    Every operation that makes a vertex makes two triangles (tmr_split, tmr_split_face), and slots are
-   never used twice:
+   never used twice, except by trials that give them back:
 
        vertices = V + loops + more
        faces    = F + border edges + 2 more
@@ -4682,24 +4683,10 @@ static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
     return count == 2;
 }
 
-/* Find the new place of vertex v; store it in w->moved and w->landed. */
-static void tmr_relax_vertex(tmr_work *w, int32_t v) {
+/* Where relaxation puts the free vertex v: the mean of the targets of its triangles, on the surface.
+   Returns 0 if it has no triangles. */
+static int tmr_relaxed_place(const tmr_work *w, int32_t v, tmr_place *at) {
     const tmr_mesh *m = &w->m;
-    const int kind = tmr_kind_of(m, v);
-    tmr_keep_place(w, v);
-    if (w->mask && !w->mask[v]) return;
-    if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
-        return;
-    if (kind != TRIMESH_FREE) {
-        int32_t two[2];
-        if (!tmr_line_neighbors(m, v, two)) return;
-        const double a = 1 / (double)w->size[two[0]], b = 1 / (double)w->size[two[1]];
-        const txm_dvec3 p = txm_d3_scale(
-            txm_d3_add(txm_d3_scale(m->p[two[0]], a), txm_d3_scale(m->p[two[1]], b)), 1 / (a + b));
-        w->moved[v] =
-            tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[v], p), 0.5), &w->landed[v]);
-        return;
-    }
     txm_dvec3 sum = txm_d3(0, 0, 0);
     int count = 0;
     int32_t c = m->corner[v];
@@ -4714,12 +4701,34 @@ static void tmr_relax_vertex(tmr_work *w, int32_t v) {
         }
         c = tmr_swing(m, c);
     } while (c != first);
-    if (count == 0) return;
+    if (count == 0) return 0;
     const txm_dvec3 to =
         txm_d3_mad(m->p[v], txm_d3_sub(txm_d3_scale(sum, 1.0 / count), m->p[v]), w->step);
-    const tmr_place at = tmr_project(w->s, to, m->source[v]);
-    w->moved[v] = at.p;
-    w->landed[v] = at.face;
+    *at = tmr_project(w->s, to, m->source[v]);
+    return 1;
+}
+
+/* Find the new place of vertex v; store it in w->moved and w->landed. */
+static void tmr_relax_vertex(tmr_work *w, int32_t v) {
+    const tmr_mesh *m = &w->m;
+    const int kind = tmr_kind_of(m, v);
+    tmr_place at;
+    tmr_keep_place(w, v);
+    if (w->mask && !w->mask[v]) return;
+    if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
+        return;
+    if (kind != TRIMESH_FREE) {
+        int32_t two[2];
+        if (!tmr_line_neighbors(m, v, two)) return;
+        const double a = 1 / (double)w->size[two[0]], b = 1 / (double)w->size[two[1]];
+        const txm_dvec3 p = txm_d3_scale(
+            txm_d3_add(txm_d3_scale(m->p[two[0]], a), txm_d3_scale(m->p[two[1]], b)), 1 / (a + b));
+        w->moved[v] =
+            tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[v], p), 0.5), &w->landed[v]);
+    } else if (tmr_relaxed_place(w, v, &at)) {
+        w->moved[v] = at.p;
+        w->landed[v] = at.face;
+    }
 }
 
 static void tmr_relax_chunk(void *context, int index) {
@@ -5797,6 +5806,379 @@ static void tmr_even_lines(tmr_work *w) {
         w->bad[v] = 0;
     }
     if (any) tmr_settle(w);
+}
+
+/* ---- operations on trial ------------------------------------------------------------------ */
+
+/* What a triangle lacks to an equilateral one of the wanted size:
+
+       1 / q - 1 + s (x + 1 / x - 2),   q = 4 sqrt(3) area / (sum of the squared sides),
+                                        x = area / wanted area
+
+   0 for the wanted triangle; near it, twice the square of its shear and s times the square of the
+   error of its area; without bound towards a degenerate one. A triangle that disagrees with the
+   surface costs so much that no gain elsewhere outweighs it. */
+#define TMR_STRAIN_OF_SIZE 0.25 /* ours: s                                                      */
+#define TMR_STRAIN_OF_WANTED 1  /* ours: s where the caller wants different sizes               */
+#define TMR_STRAIN_OF_FOLD 1000 /* ours: of a triangle that disagrees with the surface          */
+
+static double tmr_strain(const tmr_work *w, int32_t face) {
+    const tmr_mesh *m = &w->m;
+    const int32_t *v = m->vertex + 3 * face;
+    if (v[0] < 0 || tmr_is_ghost_face(m, face)) return 0;
+    const txm_dvec3 a = m->p[v[0]], b = m->p[v[1]], c = m->p[v[2]], cross = txm_d3_area2(a, b, c);
+    const double area2 = txm_d3_dot(cross, tmr_expected_normal(w, v[0], v[1], v[2]));
+    const double q = 3.4641016151377544 * area2 /
+                     (txm_d3_dist2(a, b) + txm_d3_dist2(b, c) + txm_d3_dist2(c, a));
+    if (!(q > 0.05) || area2 * area2 < TMR_LEAST_AGREEMENT * TMR_LEAST_AGREEMENT * txm_d3_len2(cross))
+        return TMR_STRAIN_OF_FOLD;
+    const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
+    const double x = area2 / (0.86602540378443865 * size * size);
+    return 1 / q - 1 + (w->s->scale ? TMR_STRAIN_OF_WANTED : TMR_STRAIN_OF_SIZE) * (x + 1 / x - 2);
+}
+
+/* The part of the mesh around an edge, as it was before a trial: the ends of the edge and the two
+   vertices opposite to it, a ring of vertices around these four, which may move, and the rim, which
+   stays. All triangles of vertices that may move belong to it, so nothing else can change. A trial that
+   promises well goes on in a patch that is one ring wider.
+
+   On a regular mesh there are 4 + 10 + 16 vertices and 46 triangles, or 52 and 82 in the wider one. A
+   larger patch than fits is not tried. */
+enum { TMR_PATCH_VERTICES = 160, TMR_PATCH_FACES = 280 };
+
+typedef struct tmr_patch_vertex {
+    txm_dvec3 p, n;
+    int32_t vertex, source, corner, valence;
+    float size;
+    uint8_t flags;
+} tmr_patch_vertex;
+
+typedef struct tmr_patch_face {
+    int32_t face, vertex[3], opposite[3], edge[3];
+} tmr_patch_face;
+
+typedef struct tmr_patch {
+    tmr_patch_vertex vertex[TMR_PATCH_VERTICES];
+    tmr_patch_face face[TMR_PATCH_FACES];
+    int vertices, faces;
+    int bound;      /* triangles that hang on lines: whose normal takes long to find            */
+    int core, movable;                                  /* vertices: the four and their ring; those that move */
+    int32_t live, live_faces, vertex_count, face_count; /* of the mesh                          */
+    int32_t added;  /* vertex that the trial has added, -1 = none                               */
+    double strain;  /* of all triangles before                                                  */
+} tmr_patch;
+
+/* Add vertex v, unless it is there. Returns 0 if there is no room. Marks it in w->bad, as
+   tmr_patch_add_face marks triangles in w->flag: both are 0 outside of the patch. */
+static int tmr_patch_add(tmr_work *w, tmr_patch *patch, int32_t v) {
+    const tmr_mesh *m = &w->m;
+    if (w->bad[v]) return 1;
+    if (patch->vertices == TMR_PATCH_VERTICES) return 0;
+    tmr_patch_vertex *k = &patch->vertex[patch->vertices++];
+    w->bad[v] = 1;
+    k->vertex = v;
+    k->p = m->p[v];
+    k->n = m->n[v];
+    k->source = m->source[v];
+    k->corner = m->corner[v];
+    k->valence = m->valence[v];
+    k->size = w->size[v];
+    k->flags = m->flags[v];
+    return 1;
+}
+
+/* Are all vertices of the triangle on lines? */
+static int tmr_is_bound(const tmr_mesh *m, int32_t face) {
+    const int32_t *v = m->vertex + 3 * face;
+    return tmr_kind_of(m, v[0]) != TRIMESH_FREE && tmr_kind_of(m, v[1]) != TRIMESH_FREE &&
+           tmr_kind_of(m, v[2]) != TRIMESH_FREE;
+}
+
+static int tmr_patch_add_face(tmr_work *w, tmr_patch *patch, int32_t face) {
+    const tmr_mesh *m = &w->m;
+    if (w->flag[face]) return 1;
+    if (patch->faces == TMR_PATCH_FACES) return 0;
+    tmr_patch_face *k = &patch->face[patch->faces++];
+    w->flag[face] = 1;
+    k->face = face;
+    patch->bound += tmr_is_bound(m, face);
+    for (int j = 0; j < 3; j++) {
+        k->vertex[j] = m->vertex[3 * face + j];
+        k->opposite[j] = m->opposite[3 * face + j];
+        k->edge[j] = m->edge[3 * face + j];
+    }
+    patch->strain += tmr_strain(w, face);
+    return 1;
+}
+
+/* Add the neighbours of the vertices from..to-1, and if wanted their triangles. Returns 0 if there is
+   no room. */
+static int tmr_patch_grow(tmr_work *w, tmr_patch *patch, int from, int to, int faces_too) {
+    const tmr_mesh *m = &w->m;
+    for (int i = from; i < to; i++) {
+        const int32_t v = patch->vertex[i].vertex, first = m->corner[v];
+        int32_t c = first;
+        if (first < 0 || tmr_is_ghost(m, v)) continue;
+        do {
+            if (!tmr_patch_add(w, patch, m->vertex[tmr_next(c)])) return 0;
+            if (faces_too && !tmr_patch_add_face(w, patch, c / 3)) return 0;
+            c = tmr_swing(m, c);
+        } while (c != first);
+    }
+    return 1;
+}
+
+static void tmr_patch_mark(tmr_work *w, const tmr_patch *patch, uint8_t mark) {
+    for (int i = 0; i < patch->vertices; i++) w->bad[patch->vertex[i].vertex] = mark;
+    for (int i = 0; i < patch->faces; i++) w->flag[patch->face[i].face] = mark;
+    for (int32_t f = patch->face_count; f < w->m.face_count; f++) w->flag[f] = mark;
+    if (patch->added >= 0) w->bad[patch->added] = mark;
+}
+
+/* Keep the state around the edge opposite to c. Returns 0 if the patch is too large. */
+static int tmr_patch_keep(tmr_work *w, tmr_patch *patch, int32_t c) {
+    const tmr_mesh *m = &w->m;
+    const int32_t core[4] = {m->vertex[tmr_next(c)], m->vertex[tmr_prev(c)], m->vertex[c],
+                             m->vertex[m->opposite[c]]};
+    patch->vertices = patch->faces = patch->bound = 0;
+    patch->strain = 0;
+    patch->live = m->live;
+    patch->live_faces = m->live_faces;
+    patch->vertex_count = m->vertex_count;
+    patch->face_count = m->face_count;
+    patch->added = -1;
+    for (int k = 0; k < 4; k++) tmr_patch_add(w, patch, core[k]);
+    int fits = tmr_patch_grow(w, patch, 0, patch->vertices, 0);
+    patch->core = patch->movable = patch->vertices;
+    fits = fits && tmr_patch_grow(w, patch, 0, patch->movable, 1);
+    tmr_patch_mark(w, patch, 0);
+    return fits;
+}
+
+/* During a trial: let the rim move, too, within a rim around it. Up to now nothing beyond it has
+   changed. Where that does not fit, the patch stays as it is. */
+static void tmr_patch_widen(tmr_work *w, tmr_patch *patch) {
+    const int vertices = patch->vertices, faces = patch->faces;
+    const double strain = patch->strain;
+    tmr_patch_mark(w, patch, 1);
+    const int fits = tmr_patch_grow(w, patch, patch->movable, vertices, 1);
+    tmr_patch_mark(w, patch, 0);
+    if (fits) {
+        patch->movable = vertices;
+    } else {
+        patch->vertices = vertices;
+        patch->faces = faces;
+        patch->strain = strain;
+    }
+}
+
+/* Take the trial back. */
+static void tmr_patch_restore(tmr_work *w, const tmr_patch *patch) {
+    tmr_mesh *m = &w->m;
+    for (int i = 0; i < patch->vertices; i++) {
+        const tmr_patch_vertex *k = &patch->vertex[i];
+        const int32_t v = k->vertex;
+        m->p[v] = k->p;
+        m->n[v] = k->n;
+        m->source[v] = k->source;
+        m->corner[v] = k->corner;
+        m->valence[v] = k->valence;
+        w->size[v] = k->size;
+        m->flags[v] = k->flags;
+    }
+    for (int i = 0; i < patch->faces; i++) {
+        const tmr_patch_face *k = &patch->face[i];
+        for (int j = 0; j < 3; j++) {
+            m->vertex[3 * k->face + j] = k->vertex[j];
+            m->opposite[3 * k->face + j] = k->opposite[j];
+            m->edge[3 * k->face + j] = k->edge[j];
+        }
+    }
+    m->live = patch->live;
+    m->live_faces = patch->live_faces;
+    m->vertex_count = patch->vertex_count;
+    m->face_count = patch->face_count;
+}
+
+/* strain of the patch as it is now: of its old triangles that live, and of the new ones */
+static double tmr_patch_strain(const tmr_work *w, const tmr_patch *patch) {
+    double sum = 0;
+    for (int i = 0; i < patch->faces; i++) sum += tmr_strain(w, patch->face[i].face);
+    for (int32_t f = patch->face_count; f < w->m.face_count; f++) sum += tmr_strain(w, f);
+    return sum;
+}
+
+static void tmr_patch_relax_vertex(tmr_work *w, int32_t v) {
+    const tmr_mesh *m = &w->m;
+    tmr_place at;
+    if (m->corner[v] < 0 || tmr_kind_of(m, v) != TRIMESH_FREE) return;
+    if (m->flags[v] & (TMR_GHOST | TMR_PINNED) || !tmr_relaxed_place(w, v, &at)) return;
+    tmr_put(w, v, &at);
+}
+
+/* Relax the vertices of the patch, each from where the others are now. */
+static void tmr_patch_relax(tmr_work *w, const tmr_patch *patch) {
+    if (patch->added >= 0) tmr_patch_relax_vertex(w, patch->added);
+    for (int i = 0; i < patch->movable; i++) tmr_patch_relax_vertex(w, patch->vertex[i].vertex);
+}
+
+enum { TMR_TRIAL_SWEEPS = 8, TMR_TRIAL_WIDE = 2 }; /* ours: of relaxation; after which it is widened */
+
+/* Relax what an operation has left, and let it stay if that lowers the strain by more than the price;
+   otherwise take it back. Sweeps converge like a geometric series: once there is more left to gain
+   than the last one has gained, there is no hope. */
+static int tmr_patch_judge(tmr_work *w, tmr_patch *patch, double price) {
+    double before = tmr_patch_strain(w, patch);
+    for (int sweep = 0; sweep < TMR_TRIAL_SWEEPS; sweep++) {
+        const double then = patch->strain;
+        if (sweep == TMR_TRIAL_WIDE) tmr_patch_widen(w, patch);
+        before += patch->strain - then;
+        tmr_patch_relax(w, patch);
+        const double now = tmr_patch_strain(w, patch), excess = now + price - patch->strain;
+        if (excess < -1e-9) return 1;
+        if (excess > before - now) break;
+        before = now;
+    }
+    tmr_patch_restore(w, patch);
+    return 0;
+}
+
+/* ---- defects of the lattice --------------------------------------------------------------- */
+
+/* A pair of neighbours of valence five and seven is a dislocation: a row of the lattice ends there. A
+   flip moves it along the row, a vertex taken out or put in moves it across; two that meet may cancel.
+   Relaxation alone moves none, since each step leads over a state that is worse than both its ends. So
+   the steps are tried, relaxed and judged by the strain that is left.
+
+   Not all dislocations can go: where a surface is curved, equal triangles need them. See
+   docs/choices.md#defects. */
+enum {
+    TMR_DEFECT_PASSES = 6, /* ours: over the mesh, at most                                        */
+    TMR_DEFECT_COST = 2,   /* ours: a flip may raise the cost of valences by so much              */
+    TMR_DEFECT_BOUND = 8   /* ours: no trial where more triangles than this hang on lines         */
+};
+#define TMR_VERTEX_PRICE 0.01 /* ours: strain that a vertex is worth, for each one too many       */
+
+typedef struct tmr_defects {
+    tmr_work *w;
+    tmr_patch *patch;
+    uint8_t *was;   /* 1 per vertex: the mesh around it has changed in the last pass              */
+    int32_t target; /* vertices                                                                   */
+} tmr_defects;
+
+/* Mark the patch as changed, in w->mask_room, if the trial has succeeded. */
+static int tmr_defect_done(tmr_defects *d, double price) {
+    tmr_work *w = d->w;
+    tmr_patch *patch = d->patch;
+    if (!tmr_patch_judge(w, patch, price)) return 0;
+    for (int i = 0; i < patch->core; i++) w->mask_room[patch->vertex[i].vertex] = 1;
+    if (patch->added >= 0) w->mask_room[patch->added] = 1;
+    return 1;
+}
+
+static int tmr_defect_keep(tmr_defects *d, int32_t c) {
+    return tmr_patch_keep(d->w, d->patch, c) && d->patch->bound <= TMR_DEFECT_BOUND;
+}
+
+static int tmr_try_flip(tmr_defects *d, int32_t c) {
+    tmr_work *w = d->w;
+    if (tmr_flip_gain(&w->m, c) < -TMR_DEFECT_COST || !tmr_can_flip(&w->m, c)) return 0;
+    if (!tmr_defect_keep(d, c)) return 0;
+    tmr_flip(&w->m, c);
+    return tmr_defect_done(d, 0);
+}
+
+static int tmr_try_removal(tmr_defects *d, int32_t c) {
+    tmr_work *w = d->w;
+    if (tmr_count_cost(&w->m, c, -1) > 0 || !tmr_can_collapse(&w->m, c)) return 0;
+    if (!tmr_defect_keep(d, c) || !tmr_try_collapse(w, c, 0, 1)) return 0;
+    return tmr_defect_done(d, -TMR_VERTEX_PRICE * (w->m.live + 1 - d->target));
+}
+
+/* A vertex is put in by a split of c's edge a b, which gives it four neighbours, and a flip of one of
+   the outer edges of the two triangles, which gives it a fifth: of a d, where d is the third corner of
+   one of them, e that of the other, and y lies behind a d. There are four such edges. a has one
+   neighbour less then, e and y have one more.
+
+   Returns the corner at y, -1 if that edge stays; *cost receives the change of the cost of valences. */
+static int32_t tmr_insertion(const tmr_mesh *m, int32_t c, int which, int64_t *cost) {
+    const int32_t i = which & 2 ? m->opposite[c] : c; /* at d */
+    const int32_t side = which & 1 ? tmr_next(i) : tmr_prev(i), y = m->opposite[side];
+    const int32_t a = m->vertex[which & 1 ? tmr_prev(i) : tmr_next(i)];
+    const int32_t e = m->vertex[m->opposite[i]];
+    if (m->edge[side] || tmr_is_ghost(m, m->vertex[y])) return -1;
+    *cost = 1; /* of v, which has five neighbours */
+    *cost += tmr_valence_cost(m, a, -1) - tmr_valence_cost(m, a, 0);
+    *cost += tmr_valence_cost(m, e, 1) - tmr_valence_cost(m, e, 0);
+    *cost += tmr_valence_cost(m, m->vertex[y], 1) - tmr_valence_cost(m, m->vertex[y], 0);
+    return y;
+}
+
+static int tmr_try_insertions(tmr_defects *d, int32_t c) {
+    tmr_work *w = d->w;
+    for (int which = 0; which < 4; which++) {
+        int64_t cost;
+        const int32_t y = tmr_insertion(&w->m, c, which, &cost);
+        if (y < 0 || cost > 0 || !tmr_defect_keep(d, c)) continue;
+        d->patch->added = tmr_split_edge(w, c);
+        if (d->patch->added < 0) return 0;
+        if (!tmr_can_flip(&w->m, y)) {
+            tmr_patch_restore(w, d->patch);
+            continue;
+        }
+        tmr_flip(&w->m, y);
+        if (tmr_defect_done(d, TMR_VERTEX_PRICE * (w->m.live - 1 - d->target))) return 1;
+    }
+    return 0;
+}
+
+/* One pass over the edges of which an end or opposite vertex has changed. Returns how many steps were
+   taken. */
+static int32_t tmr_defect_pass(tmr_defects *d) {
+    tmr_work *w = d->w;
+    tmr_mesh *m = &w->m;
+    const int32_t corners = 3 * m->face_count;
+    int32_t steps = 0;
+    memcpy(d->was, w->mask_room, (size_t)m->vertex_count);
+    memset(d->was + m->vertex_count, 0, (size_t)(m->vertex_limit - m->vertex_count));
+    memset(w->mask_room, 0, (size_t)m->vertex_limit);
+    for (int32_t c = 0; c < corners; c++) {
+        if (!tmr_is_real_edge(m, c) || m->edge[c]) continue;
+        const int32_t end[4] = {m->vertex[tmr_next(c)], m->vertex[tmr_prev(c)], m->vertex[c],
+                                m->vertex[m->opposite[c]]};
+        int changed = 0, loose = 0;
+        for (int k = 0; k < 4; k++) {
+            changed |= d->was[end[k]] | w->mask_room[end[k]];
+            loose += tmr_kind_of(m, end[k]) == TRIMESH_FREE;
+        }
+        if (!changed || loose < 2 || tmr_is_ghost(m, end[2]) || tmr_is_ghost(m, end[3])) continue;
+        const int is_free =
+            tmr_kind_of(m, end[0]) == TRIMESH_FREE && tmr_kind_of(m, end[1]) == TRIMESH_FREE;
+        steps += tmr_try_flip(d, c) ||
+                 (is_free && (tmr_try_removal(d, c) || tmr_try_insertions(d, c)));
+    }
+    return steps;
+}
+
+/* Move and cancel the dislocations of a mesh that is nearly relaxed, at about target vertices. */
+static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+    tmr_mesh *m = &w->m;
+    tmr_defects d;
+    d.w = w;
+    d.target = target;
+    d.patch = (tmr_patch *)txm_arena_alloc(scratch, 1, sizeof *d.patch);
+    d.was = (uint8_t *)txm_arena_alloc(scratch, (size_t)m->vertex_limit, 1);
+    if (!d.patch || !d.was) return TXM_OUT_OF_MEMORY;
+    w->pull = w->step = 1;
+    w->length = tmr_ideal_length(w) * sqrt((double)m->live / target);
+    memset(w->bad, 0, (size_t)m->vertex_limit);
+    memset(w->flag, 0, (size_t)m->face_limit);
+    memset(w->mask_room, 1, (size_t)m->vertex_limit);
+    for (int pass = 0; pass < TMR_DEFECT_PASSES; pass++) {
+        if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
+        if (tmr_defect_pass(&d) == 0) break;
+    }
+    return TXM_OK;
 }
 
 /* ---- subdividing -------------------------------------------------------------------------- */
@@ -7305,11 +7687,12 @@ typedef struct tmr_effort {
     int rounds, relaxations; /* in each round */
     double pull, step;       /* as in tmr_work */
 } tmr_effort;
-static const tmr_effort tmr_after_lattice = {6, 3, 1.5, 0.8};
+static const tmr_effort tmr_after_lattice = {2, 3, 1.5, 0.8};
 static const tmr_effort tmr_after_repulsion = {10, 2, 0.8, 1}; /* which is less regular          */
 static const tmr_effort tmr_after_cut = {2, 2, 1, 1};
 static const tmr_effort tmr_polish_density = {1, 2, 1.5, 0.8};
-static const tmr_effort tmr_polish_angles = {2, 2, 1.2, 1};
+static const tmr_effort tmr_polish_angles = {3, 2, 0.5, 1};
+static const tmr_effort tmr_polish_sizes = {3, 2, 1.2, 1}; /* where the caller wants different ones */
 
 /* Rounds of relaxation and flips. A strong pull evens out the density, a weak one the angles. */
 static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
@@ -7374,6 +7757,7 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     }
     if (status == TXM_OK) status = tmr_fix_count(w, target, 2, &arena, &missing);
     if (status == TXM_OK) status = tmr_improve(w, &tmr_after_lattice);
+    if (status == TXM_OK) status = tmr_mend_defects(w, target, &arena);
     txm_arena_free(&arena);
     return status;
 }
@@ -7383,7 +7767,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
     txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
     if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_density);
-    if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_angles);
+    if (status == TXM_OK) status = tmr_improve(w, w->s->scale ? &tmr_polish_sizes : &tmr_polish_angles);
     if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
     if (w->m.live != target)

@@ -41,7 +41,8 @@
      only split, collapsed (under the link condition) and flipped, so its topology cannot change.
        TRIMESH_LATTICE (default): the copy is resampled to about twice the number of vertices; a
      six-fold direction field and triangular lattice points are found on a hierarchy [3]; edges whose
-     ends share a lattice point collapse. From 20,000 vertices on this is done for a quarter of the
+     ends share a lattice point collapse. Dislocations, pairs of vertices of valence five and seven, are
+     moved by local steps until they cancel or their surroundings get no better. From 20,000 vertices on this is done for a quarter of the
      number, and then each triangle is cut in four.
        TRIMESH_REPEL: the method of [1] and [2]: points sampled by area repel each other along the
      surface and replace the old vertices by mutual tessellation, which unlike the greedy
@@ -338,6 +339,8 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/collapse.h"
 #include "trimesh_relax/fields.h"
 #include "trimesh_relax/count.h"
+#include "trimesh_relax/trial.h"
+#include "trimesh_relax/defects.h"
 #include "trimesh_relax/subdivide.h"
 #include "trimesh_relax/validity.h"
 #include "trimesh_relax/join.h"

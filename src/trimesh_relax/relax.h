@@ -164,24 +164,10 @@ static int tmr_line_neighbors(const tmr_mesh *m, int32_t v, int32_t two[2]) {
     return count == 2;
 }
 
-/* Find the new place of vertex v; store it in w->moved and w->landed. */
-static void tmr_relax_vertex(tmr_work *w, int32_t v) {
+/* Where relaxation puts the free vertex v: the mean of the targets of its triangles, on the surface.
+   Returns 0 if it has no triangles. */
+static int tmr_relaxed_place(const tmr_work *w, int32_t v, tmr_place *at) {
     const tmr_mesh *m = &w->m;
-    const int kind = tmr_kind_of(m, v);
-    tmr_keep_place(w, v);
-    if (w->mask && !w->mask[v]) return;
-    if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
-        return;
-    if (kind != TRIMESH_FREE) {
-        int32_t two[2];
-        if (!tmr_line_neighbors(m, v, two)) return;
-        const double a = 1 / (double)w->size[two[0]], b = 1 / (double)w->size[two[1]];
-        const txm_dvec3 p = txm_d3_scale(
-            txm_d3_add(txm_d3_scale(m->p[two[0]], a), txm_d3_scale(m->p[two[1]], b)), 1 / (a + b));
-        w->moved[v] =
-            tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[v], p), 0.5), &w->landed[v]);
-        return;
-    }
     txm_dvec3 sum = txm_d3(0, 0, 0);
     int count = 0;
     int32_t c = m->corner[v];
@@ -196,12 +182,34 @@ static void tmr_relax_vertex(tmr_work *w, int32_t v) {
         }
         c = tmr_swing(m, c);
     } while (c != first);
-    if (count == 0) return;
+    if (count == 0) return 0;
     const txm_dvec3 to =
         txm_d3_mad(m->p[v], txm_d3_sub(txm_d3_scale(sum, 1.0 / count), m->p[v]), w->step);
-    const tmr_place at = tmr_project(w->s, to, m->source[v]);
-    w->moved[v] = at.p;
-    w->landed[v] = at.face;
+    *at = tmr_project(w->s, to, m->source[v]);
+    return 1;
+}
+
+/* Find the new place of vertex v; store it in w->moved and w->landed. */
+static void tmr_relax_vertex(tmr_work *w, int32_t v) {
+    const tmr_mesh *m = &w->m;
+    const int kind = tmr_kind_of(m, v);
+    tmr_place at;
+    tmr_keep_place(w, v);
+    if (w->mask && !w->mask[v]) return;
+    if (m->corner[v] < 0 || kind == TRIMESH_CORNER || (m->flags[v] & (TMR_GHOST | TMR_PINNED)))
+        return;
+    if (kind != TRIMESH_FREE) {
+        int32_t two[2];
+        if (!tmr_line_neighbors(m, v, two)) return;
+        const double a = 1 / (double)w->size[two[0]], b = 1 / (double)w->size[two[1]];
+        const txm_dvec3 p = txm_d3_scale(
+            txm_d3_add(txm_d3_scale(m->p[two[0]], a), txm_d3_scale(m->p[two[1]], b)), 1 / (a + b));
+        w->moved[v] =
+            tmr_project_line(w->s, w->l, txm_d3_scale(txm_d3_add(m->p[v], p), 0.5), &w->landed[v]);
+    } else if (tmr_relaxed_place(w, v, &at)) {
+        w->moved[v] = at.p;
+        w->landed[v] = at.face;
+    }
 }
 
 static void tmr_relax_chunk(void *context, int index) {

@@ -3,6 +3,7 @@
 
 #include "fields.h"
 #include "count.h"
+#include "defects.h"
 #include "subdivide.h"
 #include "validity.h"
 #include "ridges.h"
@@ -33,11 +34,12 @@ typedef struct tmr_effort {
     int rounds, relaxations; /* in each round */
     double pull, step;       /* as in tmr_work */
 } tmr_effort;
-static const tmr_effort tmr_after_lattice = {6, 3, 1.5, 0.8};
+static const tmr_effort tmr_after_lattice = {2, 3, 1.5, 0.8};
 static const tmr_effort tmr_after_repulsion = {10, 2, 0.8, 1}; /* which is less regular          */
 static const tmr_effort tmr_after_cut = {2, 2, 1, 1};
 static const tmr_effort tmr_polish_density = {1, 2, 1.5, 0.8};
-static const tmr_effort tmr_polish_angles = {2, 2, 1.2, 1};
+static const tmr_effort tmr_polish_angles = {3, 2, 0.5, 1};
+static const tmr_effort tmr_polish_sizes = {3, 2, 1.2, 1}; /* where the caller wants different ones */
 
 /* Rounds of relaxation and flips. A strong pull evens out the density, a weak one the angles. */
 static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
@@ -102,6 +104,7 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     }
     if (status == TXM_OK) status = tmr_fix_count(w, target, 2, &arena, &missing);
     if (status == TXM_OK) status = tmr_improve(w, &tmr_after_lattice);
+    if (status == TXM_OK) status = tmr_mend_defects(w, target, &arena);
     txm_arena_free(&arena);
     return status;
 }
@@ -111,7 +114,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
     txm_status status = tmr_fix_count(w, target, 2, scratch, &missing);
     if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_density);
-    if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_angles);
+    if (status == TXM_OK) status = tmr_improve(w, w->s->scale ? &tmr_polish_sizes : &tmr_polish_angles);
     if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
     if (w->m.live != target)

@@ -170,7 +170,7 @@ static txm_status tmr_alloc_mesh(tmr_work *w, int32_t vertices, int32_t faces, t
 
    The copy has one ghost vertex for each border loop and one ghost triangle for each border edge.
    Every operation that makes a vertex makes two triangles (tmr_split, tmr_split_face), and slots are
-   never used twice:
+   never used twice, except by trials that give them back:
 
        vertices = V + loops + more
        faces    = F + border edges + 2 more

@@ -416,9 +416,9 @@ static inline trimesh_mesh *made(const trimesh_desc *d, double off, found *f) {
 /* Points that only repel each other settle into a less regular pattern. */
 static inline void check_regular(const found *f, trimesh_method method) {
     const int lattice = method == TRIMESH_LATTICE;
-    assert_true(f->quality > (lattice ? 0.985 : 0.965));
-    assert_true((double)f->six > (lattice ? 0.85 : 0.7) * (double)f->inside);
-    assert_true(f->edge_cv < (lattice ? 0.07 : 0.1));
+    assert_true(f->quality > (lattice ? 0.99 : 0.97));
+    assert_true((double)f->six > (lattice ? 0.92 : 0.7) * (double)f->inside);
+    assert_true(f->edge_cv < (lattice ? 0.06 : 0.1));
 }
 
 #endif /* RETILEKIT_H */
