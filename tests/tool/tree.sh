@@ -60,6 +60,13 @@ check "at rest" run 0 $tree -o rest.glb --stats stats.json
 check "has no clip" $check_tree skin rest.glb keys=0 joints="$(figure joints)"
 check "tells figures" figures trees=1 keys=0
 small="$tree --sheet 128"
+check "--lods" run 0 $small -o lods.glb --lods 3 --wind 5 --seconds 1 --stats stats.json
+check "tells the pieces of each level" grep -q "^lods-2.glb: 3[0-9] pieces" out.log
+for level in lods lods-1 lods-2; do
+    check "$level is whole, closed and moves" $check_tree skin $level.glb keys=13
+done
+check "the first level is the tree without levels" run 0 $small -o alone.glb --wind 5 --seconds 1
+check "to the byte" cmp lods.glb alone.glb
 check "--bones" run 0 $small -o bones.glb --bones 25 --wind 6
 check "leaves so many joints" $check_tree skin bones.glb joints=25 keys=49 seconds=4 expect=bones.json
 keep bones.glb bones.json
@@ -193,7 +200,7 @@ refuses 2 "--variants" $small_forest -o n.glb --variants 0
 for name in oak spruce dead; do
     check "$name with numbers for a shader" run 0 tree -o wind.glb --wind-attributes --species $name \
         --pieces 150 --sheet 128
-    check "and with a skeleton" run 0 tree -o skin.glb --species $name --pieces 150 --sheet 128
+    check "and with a skeleton" run 0 tree -o skin.glb --species $name --pieces 150 --sheet 128 --bones 150
     check "stand and move alike" $check_tree attributes wind.glb skin=skin.glb
     cp wind.glb "$glbs/wind-$name.glb" && echo '{"joints": 0}' >"$glbs/wind-$name.json"
 done
@@ -286,6 +293,8 @@ refuses 2 "--pose" tree -o n.glb --pose 2
 refuses 2 "--seconds" tree -o n.glb --wind 5 --seconds 0.1
 refuses 2 "--wind SPEED" tree -o n.glb --seconds 2
 refuses 2 ".glb" tree -o n.obj --bones 20
+refuses 2 ".glb" tree -o n.obj --lods 3
+refuses 2 "--lods" tree -o n.glb --lods 1
 refuses 2 "--spacing" forest --count 3 -o n.glb --spacing 0
 refuses 2 "--level" forest --count 3 -o n.glb --level 2
 refuses 2 "at most" forest --count 3 -o n.glb --species oak,oak,oak,oak,oak,oak,oak,oak,oak

@@ -14,17 +14,21 @@ enum { MAX_LEVEL = 16, BAKED_LOOKS = 8 };
 static const cli_manual tree_manual = {
     "tree", "-o OUT [options]", "grow a tree from interlocking pieces",
     "OUT ends in\n"
-    "  .glb  one mesh on a skeleton with a joint for every piece, and with --wind an\n"
+    "  .glb  one mesh on a skeleton of the thickest pieces, and with --wind an\n"
     "        animation of its swaying that loops seamlessly\n"
     "  .obj  a mesh with its pictures beside it; the bark is one closed surface\n"
     "  .ply  the same mesh with colors, without pictures; .stl, without colors as well\n"
     "  .txt  the species itself, to edit and pass to --species (see docs/trees.md)\n"
     "Species: oak, beech, maple, birch, poplar, willow, almond, pine, spruce, dead.\n"
-    "Each --seed gives a different tree. --bones gives the thinnest twigs no joints of their\n"
-    "own, for engines that allow few. --pose bends every joint a little at random: the\n"
+    "Each --seed gives a different tree. A skeleton has 128 joints, or as many as --bones says,\n"
+    "and at most one for each piece; thinner twigs move with the branches that bear them. A\n"
+    "joint costs an engine a matrix a frame, and the file 16 bytes for each key of --wind.\n"
+    "--lods writes coarser levels of the same tree as files of their own: each has a third of\n"
+    "the pieces of the one before, the same height and main branches, and fewer twigs. --pose bends every joint a little at random: the\n"
     "skeleton of a .glb, the mesh of an .obj or .ply. In .obj and .ply, --wind bends the mesh\n"
     "as at one moment. Without --tiles and --leaf, bark and leaves are drawn procedurally.\n",
     "  texkit tree -o oak.glb --species oak --wind 8\n"
+    "  texkit tree -o birch.glb --species birch --pieces 2000 --lods 3\n"
     "  texkit tree -o mine.txt --species birch\n"
     "  texkit tree -o mine.obj --species mine.txt --tiles bark-tiles --level 3\n",
     0, NULL, 0, "take fewer --pieces", ".glb"};
@@ -224,6 +228,7 @@ static int build_rigged(tree_job *j, built *b) {
     add_part(b, &b->wood[0], &j->bark_materials[0]);
     add_part(b, &b->foliage[0], &j->leaf_materials[0]);
     b->scene.skeleton = &b->rig.skeleton;
+    if (j->lod) return status;
     cli_figure(&j->run, "joints", b->rig.skeleton.joint_count);
     cli_figure(&j->run, "keys", b->rig.skeleton.key_count);
     return status;
@@ -324,7 +329,7 @@ static size_t count_vertices(const built *b) {
 
 static int write_output(tree_job *j, built *b) {
     cli *run = &j->run;
-    cli_file files[2 + 2 * MAX_SPECIES];
+    cli_file files[2 + 2 * MAX_SPECIES + MAX_LEVELS];
     unsigned char *bytes = NULL, *mtl = NULL;
     const char *why;
     int status = CLI_DONE, count = 1;
@@ -351,6 +356,11 @@ static int write_output(tree_job *j, built *b) {
             files[count++].size = p->size;
         }
     }
+    for (int i = 1; i < j->lods; i++) {
+        files[count].name = j->levels[i].path;
+        files[count].bytes = j->levels[i].glb;
+        files[count++].size = j->levels[i].size;
+    }
     cli_figure(run, "file_bytes", (double)files[0].size);
     if (!status) status = cli_finish_files(run, files, count);
     free(bytes);
@@ -373,13 +383,42 @@ static void print_summary(const tree_job *j, const built *b, size_t triangles) {
 
 /* ---- the commands -------------------------------------------------------------------------- */
 
+/* The same tree with fewer pieces, which shares materials with the one to come. */
+static int make_level(tree_job *j, int level) {
+    const char *why;
+    built *b = (built *)new_array(1, sizeof *b);
+    if (!b) return fail_memory(&j->run);
+    j->lod = level;
+    int status = tree_grow(j);
+    cli_stage(&j->run, "build");
+    if (!status) status = j->wind_attributes ? build_baked(j, b) : build_rigged(j, b);
+    if (!status) status = make_extras(j, b);
+    b->scene.parts = b->parts;
+    if (!status && !mesh_encode(".glb", &b->scene, &j->levels[level].glb, &j->levels[level].size, &why))
+        status = cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->levels[level].path, why);
+    if (!status && !j->run.quiet)
+        printf("%s: %lu pieces, %lu triangles\n", j->levels[level].path, (unsigned long)j->forest->node_count,
+               (unsigned long)count_triangles(b));
+    free_built(b);
+    free(b);
+    tree_fell(j);
+    j->lod = 0;
+    return status;
+}
+
 /* Grow, pose, dress and write. */
 static int grow_trees(tree_job *j, built *b) {
     float tint[3];
-    int status = tree_grow(j);
+    int status = CLI_DONE;
+    if (j->lods > 1) {
+        cli_stage(&j->run, "dress");
+        status = tree_dress(j, tint);
+    }
+    for (int i = j->lods - 1; i > 0 && !status; i--) status = make_level(j, i);
+    if (!status) status = tree_grow(j);
     if (status) return status;
     cli_stage(&j->run, "dress");
-    status = tree_dress(j, tint);
+    if (j->lods < 2) status = tree_dress(j, tint);
     if (status) return status;
     cli_stage(&j->run, "build");
     if (j->variants) status = build_variants(j, b);
@@ -396,9 +435,14 @@ static int grow_trees(tree_job *j, built *b) {
     return status;
 }
 
-/* Name and announce the files beside an .obj. */
+/* Name and announce the files beside an .obj, and the levels beside a .glb. */
 static int name_files(tree_job *j) {
     char ending[32];
+    for (int i = 1; i < j->lods; i++) {
+        snprintf(ending, sizeof ending, "-%d.glb", i);
+        const int status = path_beside(&j->run, ending, j->levels[i].path);
+        if (status) return status;
+    }
     if (strcmp(j->extension, ".obj") != 0) return CLI_DONE;
     int status = path_beside(&j->run, ".mtl", j->mtl_path);
     for (int s = 0; s < j->species_count && !status; s++) {
@@ -428,7 +472,7 @@ static int run_job(tree_job *j, int needs_glb) {
     int status = check_output_kind(j);
     if (status) return status;
     if (needs_glb && !tree_is_glb(j))
-        return cli_fail(&j->run, CLI_USAGE, "--bones, --seconds and --rate go with an OUT in .glb");
+        return cli_fail(&j->run, CLI_USAGE, "--bones, --seconds, --rate and --lods go with an OUT in .glb");
     if (j->variants && !tree_is_glb(j))
         return cli_fail(&j->run, CLI_USAGE, "--variants goes with an OUT in .glb");
     if (j->wind_attributes && (!tree_is_glb(j) || (j->is_forest && !j->variants)))
@@ -480,12 +524,13 @@ static int run_tree(int argc, char **argv) {
          0, 0},
         {CLI_TEXT, "--pose", "AMOUNT",
          "bend the joints at random, by at most this many radians, 0 to 1", &bend, 0, 0},
-        {CLI_INT, "--bones", "N", "maximum number of joints; default: one per piece", &j->bones, 1,
-         65535},
+        {CLI_INT, "--bones", "N", "maximum number of joints; default 128", &j->bones, 1, 65535},
+        {CLI_INT, "--lods", "K", "K levels, 2 to 6: OUT, and beside it OUT-1.glb, OUT-2.glb ...", &j->lods, 2,
+         MAX_LEVELS},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (!cli_begin(&j->run, &tree_manual, options, argc, argv, &status)) {
-        const int needs_glb = j->bones || seconds || j->rate;
+        const int needs_glb = j->bones || seconds || j->rate || j->lods;
         const int needs_wind = seconds || j->rate;
         if (!j->rate) j->rate = 12;
         status = parse_number(&j->run, "--wind", wind, 0, 50, &j->wind);

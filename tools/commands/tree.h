@@ -15,6 +15,8 @@
 
 enum {
     MAX_SPECIES = 8, /* of a forest                                                         */
+    MAX_LEVELS = 6,  /* of detail, the file itself included                                 */
+    MOST_JOINTS = 128, /* of a tree without --bones                                         */
     MAX_VARIANTS = 256, /* different trees of a forest of plain nodes                       */
     CLOUDS = 3,      /* different leaf clouds of a forest of one species                    */
     BARK_TILES = 8,  /* drawn if the user gives none                                        */
@@ -36,7 +38,7 @@ typedef struct tree_job {
 
     /* options */
     const char *species_list, *tiles, *leaf;
-    int count, pieces, bare, level, capped, bones, rate, sheet, variants, wind_attributes;
+    int count, pieces, bare, level, capped, bones, rate, sheet, variants, wind_attributes, lods;
     int is_forest;
     double wind, seconds, pose, spacing;
 
@@ -47,6 +49,13 @@ typedef struct tree_job {
     float *rest, *posed; /* bones; posed: by --pose and, if baked, by --wind */
 
     char mtl_path[MAX_PATH]; /* beside an .obj */
+
+    int lod; /* the level that is made; 0: OUT */
+    struct {
+        unsigned char *glb;
+        size_t size;
+        char path[MAX_PATH];
+    } levels[MAX_LEVELS]; /* the coarser ones, from 1 on */
 
     /* one bark of all species, or one of each */
     picture bark[MAX_SPECIES], leaves[MAX_SPECIES]; /* png NULL: none */
@@ -74,6 +83,9 @@ treepieces_forest_desc tree_forest_desc(const tree_job *j);
 /* Grow the trees and compute their bones. With --variants these alone grow, at the origin: number k is
    of species k mod species_count, and the tree of seed --seed + k. */
 int tree_grow(tree_job *j);
+
+/* Let go of the trees, to grow them again with fewer pieces. */
+void tree_fell(tree_job *j);
 
 /* The steady and the gusty part of --wind. */
 treepieces_wind tree_wind(const tree_job *j);

@@ -23,16 +23,24 @@ tree_job *new_tree_job(int is_forest) {
     return j;
 }
 
+void tree_fell(tree_job *j) {
+    free(j->rest);
+    free(j->posed);
+    treepieces_forest_free(j->forest);
+    treepieces_kit_free(j->kit);
+    j->rest = j->posed = NULL;
+    j->forest = NULL;
+    j->kit = NULL;
+}
+
 void free_tree_job(tree_job *j) {
     for (int s = 0; s < MAX_SPECIES; s++) {
         free(j->bark[s].png);
         free(j->relief[s].png);
         free(j->leaves[s].png);
     }
-    free(j->rest);
-    free(j->posed);
-    treepieces_forest_free(j->forest);
-    treepieces_kit_free(j->kit);
+    for (int i = 0; i < MAX_LEVELS; i++) free(j->levels[i].glb);
+    tree_fell(j);
     free(j);
 }
 
@@ -95,6 +103,11 @@ treepieces_forest_desc tree_forest_desc(const tree_job *j) {
     desc.tree_count = j->count;
     desc.spacing = (float)j->spacing;
     desc.max_pieces = j->pieces;
+    if (j->lod) { /* each level a third of the one before */
+        if (!desc.max_pieces) desc.max_pieces = 600;
+        for (int i = 0; i < j->lod; i++) desc.max_pieces /= 3;
+        if (desc.max_pieces < 8) desc.max_pieces = 8;
+    }
     desc.seed = j->run.seed;
     return desc;
 }
@@ -162,7 +175,7 @@ int tree_grow(tree_job *j) {
         check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
     if (!status) status = grow(j);
     if (status) return status;
-    grown_figures(j);
+    if (!j->lod) grown_figures(j);
     cli_stage(&j->run, "pose");
     return pose(j);
 }

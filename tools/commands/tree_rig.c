@@ -178,7 +178,7 @@ static int make_clip(tree_job *j, tree_rig *rig) {
 
 int tree_make_rig(tree_job *j, tree_rig *rig) {
     const uint32_t nodes = j->forest->node_count;
-    const uint32_t most = j->bones > 0 ? (uint32_t)j->bones : 65535;
+    const uint32_t most = j->bones > 0 ? (uint32_t)j->bones : MOST_JOINTS;
     const uint32_t count = nodes < most ? nodes : most;
     memset(rig, 0, sizeof *rig);
     rig->joint_of = (uint32_t *)new_array(nodes, sizeof(uint32_t));
