@@ -581,8 +581,8 @@ static void glb_is_made_of_whole_chunks(void **state) {
 static void obj_has_parts(void **state) {
     (void)state;
     const mesh_data m = square();
-    const mesh_material bark = {"bark", "b.png", NULL, 0, 1, 0, 0};
-    const mesh_material leaves = {"leaves", "l.png", NULL, 0, 0, 1, 0};
+    const mesh_material bark = {.name = "bark", .texture = "b.png", .repeats = 1};
+    const mesh_material leaves = {.name = "leaves", .texture = "l.png", .is_cut_out = 1};
     const mesh_part parts[] = {{&m, &bark}, {&m, &leaves}};
     mesh_scene scene = {0};
     mesh_data again;
@@ -618,7 +618,7 @@ static void glb_has_a_skeleton(void **state) {
     const mesh_skeleton skeleton = {"tree", joints, 2, "wind", 2, times, turns};
     uint32_t bound[16] = {0, 1, 7, 0};
     float weights[16] = {0.75f, 0.25f, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
-    const mesh_material bark = {"bark", NULL, NULL, 0, 0, 0, 0};
+    const mesh_material bark = {.name = "bark"};
     mesh_data m = square();
     const mesh_part part = {&m, &bark};
     mesh_scene scene = {0};
