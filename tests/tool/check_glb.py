@@ -85,7 +85,31 @@ class Glb:
         indices = [i[0] for i in self.values(p["indices"])]
         need(len(indices) % 3 == 0, "a triangle has not three corners")
         need(max(indices) < len(positions), "an index is too large")
+        material = self.json.get("materials", [{}])[p.get("material", 0)]
+        need("normalTexture" not in material or "TANGENT" in at, "a normal map without tangents")
+        if "TANGENT" in at:
+            self.tangents(at, positions, indices)
         return positions, indices
+
+    def tangents(self, at, positions, indices):
+        """Unit, at right angles to the normals, in the direction in which u grows; w: unmirrored."""
+        tangents, normals, uvs = (self.values(at[n]) for n in ("TANGENT", "NORMAL", "TEXCOORD_0"))
+        for t, n in zip(tangents, normals):
+            need(abs(math.hypot(*t[:3]) - 1) < 1e-3 and abs(t[3]) == 1, "a tangent")
+            need(abs(sum(x * y for x, y in zip(t, n))) < 1e-3, "a tangent that is not on the surface")
+        right = count = 0
+        for i in range(0, len(indices), 3):
+            a, b, c = indices[i:i + 3]
+            e, f = ([q - p for p, q in zip(positions[a], positions[x])] for x in (b, c))
+            (s, u), (v, w) = ([q - p for p, q in zip(uvs[a], uvs[x])] for x in (b, c))
+            area = s * w - v * u
+            if abs(area) < 1e-12:
+                continue
+            along = [(x * w - y * u) / area for x, y in zip(e, f)]
+            count += 1
+            right += all(sum(x * y for x, y in zip(along, tangents[k])) > 0 and tangents[k][3] * area < 0
+                         for k in (a, b, c))
+        need(right > 0.85 * count, "%d of %d triangles have tangents along u" % (right, count))
 
 
 def instances_of(glb, node):

@@ -82,16 +82,75 @@ static int glb_material(glb *g, const mesh_material *material, const char *name)
 }
 
 /* glTF requires unit normals, so zero becomes another one. */
-static void put_normal(sink *s, const float *n) {
+static void unit_normal(const float *n, float unit[3]) {
     const double x = (double)n[0], y = (double)n[1], z = (double)n[2];
     const double length = sqrt(x * x + y * y + z * z);
-    float unit[3] = {0, 0, 1};
+    unit[0] = unit[1] = 0;
+    unit[2] = 1;
     if (length > 1e-30) {
         unit[0] = (float)(x / length);
         unit[1] = (float)(y / length);
         unit[2] = (float)(z / length);
     }
-    sink_floats(s, unit, 3);
+}
+
+/* The normal of a vertex of a mesh that has some. */
+static const float *normal_of(const mesh_data *m, const flat_mesh *f, size_t i) {
+    return m->corner_normals ? m->corner_normals + 3 * (size_t)f->split.first[i]
+                             : m->normals + 3 * flat_vertex(f, i);
+}
+
+/* Add to each corner of a triangle the direction in which u grows, and whether the picture is unmirrored
+   there: v runs downwards, so that a triangle seen from outside then runs the other way in it. */
+static void add_tangent(const mesh_data *m, const flat_mesh *f, size_t triangle, double *sums) {
+    double edge[2][3], du[2], dv[2], along[3], length = 0;
+    const size_t first = flat_index(f, 3 * triangle);
+    for (size_t k = 0; k < 2; k++) {
+        const size_t i = flat_index(f, 3 * triangle + k + 1);
+        for (size_t a = 0; a < 3; a++)
+            edge[k][a] = (double)m->positions[3 * flat_vertex(f, i) + a] -
+                         (double)m->positions[3 * flat_vertex(f, first) + a];
+        du[k] = (double)flat_uv(f, i)[0] - (double)flat_uv(f, first)[0];
+        dv[k] = (double)flat_uv(f, i)[1] - (double)flat_uv(f, first)[1];
+    }
+    const double area = du[0] * dv[1] - du[1] * dv[0], sign = area < 0 ? -1 : 1;
+    for (int a = 0; a < 3; a++) {
+        along[a] = sign * (edge[0][a] * dv[1] - edge[1][a] * dv[0]);
+        length += along[a] * along[a];
+    }
+    if (area == 0 || !(length > 0)) return;
+    for (size_t k = 0; k < 3; k++) {
+        double *sum = sums + 4 * flat_index(f, 3 * triangle + k);
+        for (int a = 0; a < 3; a++) sum[a] += along[a] / sqrt(length);
+        sum[3] -= sign;
+    }
+}
+
+/* The directions of u on the surface, for normal maps: programs make their own differently. 0: no memory */
+static int glb_tangents(glb *g, const mesh_data *m, const flat_mesh *f) {
+    const size_t start = g->binary.bytes.count;
+    double *sums = (double *)calloc(4 * f->count + 1, sizeof *sums);
+    if (!sums) return 0;
+    for (size_t t = 0; t < m->triangle_count; t++) add_tangent(m, f, t, sums);
+    for (size_t i = 0; i < f->count; i++) {
+        const double *sum = sums + 4 * i;
+        float n[3], tangent[4] = {0, 0, 0, sum[3] < 0 ? -1.0f : 1.0f};
+        unit_normal(normal_of(m, f, i), n);
+        const txm_dvec3 normal = txm_d3((double)n[0], (double)n[1], (double)n[2]);
+        txm_dvec3 u = txm_d3(sum[0], sum[1], sum[2]);
+        u = txm_d3_sub(u, txm_d3_scale(normal, txm_d3_dot(u, normal)));
+        if (txm_d3_dot(u, u) < 1e-12) /* any other direction on the surface */
+            u = fabs(normal.x) < 0.6 ? txm_d3(0, normal.z, -normal.y) : txm_d3(-normal.z, 0, normal.x);
+        u = txm_d3_unit(u);
+        tangent[0] = (float)u.x;
+        tangent[1] = (float)u.y;
+        tangent[2] = (float)u.z;
+        sink_floats(&g->binary, tangent, 4);
+    }
+    free(sums);
+    sink_print(&g->meshes, ",\"TANGENT\":%d",
+               glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f->count, "VEC4", NULL));
+    return 1;
 }
 
 /* sRGB to linear, in 16 bits so that dark colors stay distinct. */
@@ -191,9 +250,11 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
                glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
     if (m->normals || m->corner_normals) {
         start = bin->bytes.count;
-        for (size_t i = 0; i < f.count; i++)
-            put_normal(bin, m->corner_normals ? m->corner_normals + 3 * (size_t)f.split.first[i]
-                                              : m->normals + 3 * flat_vertex(&f, i));
+        for (size_t i = 0; i < f.count; i++) {
+            float unit[3];
+            unit_normal(normal_of(m, &f, i), unit);
+            sink_floats(bin, unit, 3);
+        }
         sink_print(s, ",\"NORMAL\":%d",
                    glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", NULL));
     }
@@ -218,7 +279,8 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
                                 NULL));
     }
     if (m->joints) glb_weights(g, m, &f);
-    const int ok = glb_triangles(g, m, &f, opening, material);
+    const int has_relief = material && material->relief && m->uvs && (m->normals || m->corner_normals);
+    const int ok = (!has_relief || glb_tangents(g, m, &f)) && glb_triangles(g, m, &f, opening, material);
     split_free(&f.split);
     return ok;
 }
