@@ -11192,8 +11192,10 @@ static void txs_find_slopes(texsyn_light *l) {
                    ((double)l->from[k + 1] - (double)l->from[k]);
     l->slope[0] = txm_float(steep[0]);
     l->slope[n - 1] = txm_float(steep[n - 2]);
-    for (int k = 1; k + 1 < n; k++)
-        l->slope[k] = txm_float(2 * steep[k - 1] * steep[k] / (steep[k - 1] + steep[k]));
+    for (int k = 1; k + 1 < n; k++) {
+        const double sum = steep[k - 1] + steep[k]; /* 0 where knots round to one value */
+        l->slope[k] = sum > 0 ? txm_float(2 * steep[k - 1] * steep[k] / sum) : 0;
+    }
 }
 
 /* The curve: quantiles of the one become those of the other, within the limits of its slope. Below
@@ -11215,7 +11217,7 @@ static void txs_fit_curve(txs_swatches *a, txs_swatches *b, int raised, texsyn_l
     to = (double)l->to[l->knots - 1];
     for (int k = 1; k < TXS_BINS_OF_LIGHT + 2; k++) {
         const double step = x[k] - (double)l->from[l->knots - 1];
-        if (step <= TXS_NEXT_KNOT) continue;
+        if (step <= TXS_NEXT_KNOT || !(txm_float(x[k]) > l->from[l->knots - 1])) continue;
         to = txs_limit(y[k], to + TXS_FLATTEST * step, to + TXS_STEEPEST_CURVE * step);
         txs_add_knot(l, x[k], to);
     }

@@ -326,6 +326,36 @@ static void test_plain_pictures(void **state) {
     }
 }
 
+/* A few samples a million away: knots of the curve round to one value, and it is still a curve. */
+static void test_far_samples(void **state) {
+    (void)state;
+    static float image[COUNT * 3], like[COUNT * 3], out[COUNT * 3];
+    texsyn_relight_desc d;
+    txm_rng rng = txm_rng_make(5, 0);
+    memset(&d, 0, sizeof d);
+    d.image = view_float(image, SIDE, SIDE, 3);
+    d.like = view_float(like, SIDE, SIDE, 3);
+    for (int far_one = -1; far_one <= 1; far_one += 2) {
+        for (int which = 0; which < 2; which++) {
+            texsyn_light light;
+            for (int i = 0; i < 3 * COUNT; i++) {
+                image[i] = txm_rng_float(&rng);
+                like[i] = txm_rng_float(&rng);
+                if (i / 3 % 40 == 0) (which ? image : like)[i] = 1e6f * (float)far_one;
+            }
+            assert_int_equal(texsyn_light_learn(&d, NULL, &light), TXM_OK);
+            for (int k = 0; k < light.knots; k++) {
+                assert_true(txm_is_finite((double)light.slope[k]) && light.slope[k] >= 0);
+                if (k) assert_true(light.from[k] > light.from[k - 1] && light.to[k] >= light.to[k - 1]);
+            }
+            assert_int_equal(texsyn_light_apply(&light, 1, &d.image, NULL, view_float(out, SIDE, SIDE, 3)),
+                             TXM_OK);
+            relight(&d, view_float(out, SIDE, SIDE, 3));
+            for (int i = 0; i < 3 * COUNT; i++) assert_true(txm_is_finite((double)out[i]));
+        }
+    }
+}
+
 /* ---- bad input, faults ------------------------------------------------------------------ */
 
 static void refuses(const texsyn_relight_desc *d, txm_status expected, const char *what) {
@@ -450,7 +480,8 @@ int main(void) {
         cmocka_unit_test(test_lights_are_undone), cmocka_unit_test(test_unequal_shares),
         cmocka_unit_test(test_grays_stay_gray),   cmocka_unit_test(test_no_bands),
         cmocka_unit_test(test_strength),          cmocka_unit_test(test_masks),
-        cmocka_unit_test(test_channels),          cmocka_unit_test(test_plain_pictures),
+        cmocka_unit_test(test_channels), cmocka_unit_test(test_plain_pictures),
+        cmocka_unit_test(test_far_samples),
         cmocka_unit_test(test_refuses),           cmocka_unit_test(test_apply_refuses),
         cmocka_unit_test(test_faults_and_threads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
