@@ -65,6 +65,14 @@ check "tells the pieces of each level" grep -q "^lods-2.glb: 3[0-9] pieces" out.
 for level in lods lods-1 lods-2; do
     check "$level is whole, closed and moves" $check_tree skin $level.glb keys=13
 done
+check "--collision" run 0 $small -o hull.glb --collision
+# each edge runs once to and once fro
+check "is closed" awk '
+    /^f/ { for (k = 2; k <= 4; k++) v[k - 2] = int($k)
+           for (k = 0; k < 3; k++) { to = v[(k + 1) % 3]; n += ++way[v[k] " " to] > 1 || v[k] == to } }
+    END { for (e in way) { split(e, p, " "); n += !((p[2] " " p[1]) in way); edges++ }
+          exit n > 0 || edges < 1000 }' hull-collision.obj
+check "and coarse" test "$(grep -c ^f hull-collision.obj)" -lt 1400
 check "the first level is the tree without levels" run 0 $small -o alone.glb --wind 5 --seconds 1
 check "to the byte" cmp lods.glb alone.glb
 check "--bones" run 0 $small -o bones.glb --bones 25 --wind 6
@@ -295,6 +303,7 @@ refuses 2 "--wind SPEED" tree -o n.glb --seconds 2
 refuses 2 ".glb" tree -o n.obj --bones 20
 refuses 2 ".glb" tree -o n.obj --lods 3
 refuses 2 "--lods" tree -o n.glb --lods 1
+refuses 2 "standard output" tree -o - --collision
 refuses 2 "--spacing" forest --count 3 -o n.glb --spacing 0
 refuses 2 "--level" forest --count 3 -o n.glb --level 2
 refuses 2 "at most" forest --count 3 -o n.glb --species oak,oak,oak,oak,oak,oak,oak,oak,oak

@@ -329,7 +329,7 @@ static size_t count_vertices(const built *b) {
 
 static int write_output(tree_job *j, built *b) {
     cli *run = &j->run;
-    cli_file files[2 + 2 * MAX_SPECIES + MAX_LEVELS];
+    cli_file files[2 + 2 * MAX_SPECIES + MAX_LEVELS]; /* OUT, .mtl, pictures, levels */
     unsigned char *bytes = NULL, *mtl = NULL;
     const char *why;
     int status = CLI_DONE, count = 1;
@@ -356,9 +356,10 @@ static int write_output(tree_job *j, built *b) {
             files[count++].size = p->size;
         }
     }
-    for (int i = 1; i < j->lods; i++) {
+    for (int i = 0; i < MAX_LEVELS; i++) {
+        if (!j->levels[i].bytes) continue;
         files[count].name = j->levels[i].path;
-        files[count].bytes = j->levels[i].glb;
+        files[count].bytes = j->levels[i].bytes;
         files[count++].size = j->levels[i].size;
     }
     cli_figure(run, "file_bytes", (double)files[0].size);
@@ -394,7 +395,7 @@ static int make_level(tree_job *j, int level) {
     if (!status) status = j->wind_attributes ? build_baked(j, b) : build_rigged(j, b);
     if (!status) status = make_extras(j, b);
     b->scene.parts = b->parts;
-    if (!status && !mesh_encode(".glb", &b->scene, &j->levels[level].glb, &j->levels[level].size, &why))
+    if (!status && !mesh_encode(".glb", &b->scene, &j->levels[level].bytes, &j->levels[level].size, &why))
         status = cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->levels[level].path, why);
     if (!status && !j->run.quiet)
         printf("%s: %lu pieces, %lu triangles\n", j->levels[level].path, (unsigned long)j->forest->node_count,
@@ -403,6 +404,44 @@ static int make_level(tree_job *j, int level) {
     free(b);
     tree_fell(j);
     j->lod = 0;
+    return status;
+}
+
+/* Trunk and main branches as one closed mesh, without a picture. */
+static int make_collision(tree_job *j) {
+    const mesh_material plain = {"collision", NULL, NULL, 0, NULL, 0, 0, 0, 0};
+    const int capped = j->capped;
+    const char *why;
+    treepieces_mesh *bark = NULL, *leaves = NULL;
+    built *b = (built *)new_array(1, sizeof *b);
+    if (!b) return fail_memory(&j->run);
+    j->lod = -1;
+    j->capped = 1;
+    int status = tree_grow(j);
+    if (!status) status = bake_tree(j, 0, j->posed, &bark, &leaves);
+    if (!status && !extend(&b->wood[0], bark->vertex_count, bark->triangle_count, 0, 0))
+        status = fail_memory(&j->run);
+    if (!status) {
+        mesh_data *m = &b->wood[0];
+        m->vertex_count = bark->vertex_count;
+        m->triangle_count = bark->triangle_count;
+        memcpy(m->positions, bark->positions, 3 * m->vertex_count * sizeof(float));
+        memcpy(m->normals, bark->normals, 3 * m->vertex_count * sizeof(float));
+        memcpy(m->indices, bark->indices, 3 * m->triangle_count * sizeof(uint32_t));
+        add_part(b, m, &plain);
+        b->scene.parts = b->parts;
+        if (!mesh_encode(".obj", &b->scene, &j->levels[0].bytes, &j->levels[0].size, &why))
+            status = cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->levels[0].path, why);
+    }
+    if (!status && !j->run.quiet)
+        printf("%s: %lu triangles\n", j->levels[0].path, (unsigned long)count_triangles(b));
+    treepieces_mesh_free(bark);
+    treepieces_mesh_free(leaves);
+    free_built(b);
+    free(b);
+    tree_fell(j);
+    j->lod = 0;
+    j->capped = capped;
     return status;
 }
 
@@ -415,6 +454,7 @@ static int grow_trees(tree_job *j, built *b) {
         status = tree_dress(j, tint);
     }
     for (int i = j->lods - 1; i > 0 && !status; i--) status = make_level(j, i);
+    if (j->collision && !status) status = make_collision(j);
     if (!status) status = tree_grow(j);
     if (status) return status;
     cli_stage(&j->run, "dress");
@@ -441,6 +481,10 @@ static int name_files(tree_job *j) {
     for (int i = 1; i < j->lods; i++) {
         snprintf(ending, sizeof ending, "-%d.glb", i);
         const int status = path_beside(&j->run, ending, j->levels[i].path);
+        if (status) return status;
+    }
+    if (j->collision) {
+        const int status = path_beside(&j->run, "-collision.obj", j->levels[0].path);
         if (status) return status;
     }
     if (strcmp(j->extension, ".obj") != 0) return CLI_DONE;
@@ -527,6 +571,8 @@ static int run_tree(int argc, char **argv) {
         {CLI_INT, "--bones", "N", "maximum number of joints; default 128", &j->bones, 1, 65535},
         {CLI_INT, "--lods", "K", "K levels, 2 to 6: OUT, and beside it OUT-1.glb, OUT-2.glb ...", &j->lods, 2,
          MAX_LEVELS},
+        {CLI_FLAG, "--collision", NULL, "beside OUT, OUT-collision.obj: trunk and main branches, closed",
+         &j->collision, 0, 0},
         {CLI_END, NULL, NULL, NULL, NULL, 0, 0},
     };
     if (!cli_begin(&j->run, &tree_manual, options, argc, argv, &status)) {

@@ -16,6 +16,7 @@
 enum {
     MAX_SPECIES = 8, /* of a forest                                                         */
     MAX_LEVELS = 6,  /* of detail, the file itself included                                 */
+    HULL_PIECES = 48, /* of a tree for collisions                                           */
     MOST_JOINTS = 128, /* of a tree without --bones                                         */
     MAX_VARIANTS = 256, /* different trees of a forest of plain nodes                       */
     CLOUDS = 3,      /* different leaf clouds of a forest of one species                    */
@@ -38,7 +39,7 @@ typedef struct tree_job {
 
     /* options */
     const char *species_list, *tiles, *leaf;
-    int count, pieces, bare, level, capped, bones, rate, sheet, variants, wind_attributes, lods;
+    int count, pieces, bare, level, capped, bones, rate, sheet, variants, wind_attributes, lods, collision;
     int is_forest;
     double wind, seconds, pose, spacing;
 
@@ -52,10 +53,10 @@ typedef struct tree_job {
 
     int lod; /* the level that is made; 0: OUT */
     struct {
-        unsigned char *glb;
+        unsigned char *bytes;
         size_t size;
         char path[MAX_PATH];
-    } levels[MAX_LEVELS]; /* the coarser ones, from 1 on */
+    } levels[MAX_LEVELS]; /* the coarser ones, from 1 on; 0: for collisions */
 
     /* one bark of all species, or one of each */
     picture bark[MAX_SPECIES], leaves[MAX_SPECIES]; /* png NULL: none */

@@ -39,7 +39,7 @@ void free_tree_job(tree_job *j) {
         free(j->relief[s].png);
         free(j->leaves[s].png);
     }
-    for (int i = 0; i < MAX_LEVELS; i++) free(j->levels[i].glb);
+    for (int i = 0; i < MAX_LEVELS; i++) free(j->levels[i].bytes);
     tree_fell(j);
     free(j);
 }
@@ -103,9 +103,10 @@ treepieces_forest_desc tree_forest_desc(const tree_job *j) {
     desc.tree_count = j->count;
     desc.spacing = (float)j->spacing;
     desc.max_pieces = j->pieces;
-    if (j->lod) { /* each level a third of the one before */
+    if (j->lod) { /* each level a third of the one before; -1: for collisions */
         if (!desc.max_pieces) desc.max_pieces = 600;
         for (int i = 0; i < j->lod; i++) desc.max_pieces /= 3;
+        if (j->lod < 0 && desc.max_pieces > HULL_PIECES) desc.max_pieces = HULL_PIECES;
         if (desc.max_pieces < 8) desc.max_pieces = 8;
     }
     desc.seed = j->run.seed;
