@@ -207,8 +207,9 @@ static void tpc_find_instance(const treepieces_forest *forest, const float *bone
         s->child[k] = s->own + TREEPIECES_BONE * (size_t)difference[k];
         s->turn[k] = (int)(word[2] >> (16 + 4 * k) & 15u);
         tpc_columns(s->child[k], s->squares[k]);
-        s->stretch[k] = sqrtf(s->squares[k][0] * s->own_squares[1] /
-                              (s->own_squares[0] * s->squares[k][1]));
+        /* products of the squares would underflow where a species at its limits is that small */
+        s->stretch[k] = sqrtf((s->squares[k][0] / s->own_squares[0]) *
+                              (s->own_squares[1] / s->squares[k][1]));
     }
 }
 

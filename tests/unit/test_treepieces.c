@@ -269,6 +269,43 @@ static void test_scatter(void **state) {
     assert_memory_equal(before, places, sizeof places);
 }
 
+/* a rule whose branches are a tenth as thick as what they stand on */
+static void thinner(void *user, const treepieces_site *site, txm_rng *rng, treepieces_choice *choice) {
+    (void)user;
+    (void)rng;
+    choice->type = site->depth < 6 ? TREEPIECES_SIDE : TREEPIECES_TIP;
+    choice->length = 2.5f * site->radius;
+    choice->ratios[0] = choice->ratios[1] = 0.1f;
+}
+
+/* A tree of a micrometre is skinned as any other. */
+static void test_tiny(void **state) {
+    (void)state;
+    treepieces_species small = oak;
+    treepieces_place place;
+    memset(&place, 0, sizeof place);
+    small.orders[0].length = 0.01f;
+    small.orders[0].radius = 0.001f;
+    place.scale = 1e-3f;
+    treepieces_forest_desc d = describe(1, 300);
+    d.species = &small;
+    d.own_rule = thinner;
+    d.places = &place;
+    treepieces_forest *f = grow(&d);
+    float *bones = make_bones(f, NULL);
+    skinned s = skin_all(f, bones);
+    for (uint32_t i = 0; i < f->node_count; i++) {
+        const treepieces_piece *p = treepieces_kit_piece(f->kit, f->nodes[i].type);
+        for (size_t k = 0; k < 3 * (size_t)p->vertex_count; k++) {
+            assert_true(txm_is_finite((double)s.positions[3 * s.first[i] + k]));
+            assert_true(txm_is_finite((double)s.normals[3 * s.first[i] + k]));
+        }
+    }
+    free_skinned(&s);
+    free(bones);
+    treepieces_forest_free(f);
+}
+
 /* With fewer pieces: no more than the limit, all ends closed, the thick parts still there. */
 static void test_budget(void **state) {
     (void)state;
@@ -746,6 +783,7 @@ int main(void) {
         cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
         cmocka_unit_test(test_memory),    cmocka_unit_test(test_scatter),
         cmocka_unit_test(test_sway_has_scales), cmocka_unit_test(test_period),
+        cmocka_unit_test(test_tiny),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
