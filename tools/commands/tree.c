@@ -24,9 +24,10 @@ static const cli_manual tree_manual = {
     "and at most one for each piece; thinner twigs move with the branches that bear them. A\n"
     "joint costs an engine a matrix a frame, and the file 16 bytes for each key of --wind.\n"
     "--lods writes coarser levels of the same tree as files of their own: each has a third of\n"
-    "the pieces of the one before, the same height and main branches, and fewer twigs. --pose bends every joint a little at random: the\n"
-    "skeleton of a .glb, the mesh of an .obj or .ply. In .obj and .ply, --wind bends the mesh\n"
-    "as at one moment. Without --tiles and --leaf, bark and leaves are drawn procedurally.\n",
+    "the pieces of the one before, the same height and main branches, and fewer twigs.\n"
+    "--pose bends every joint a little at random: the skeleton of a .glb, the mesh of an .obj or\n"
+    ".ply. In .obj and .ply, --wind bends the mesh as at one moment. Without --tiles and --leaf,\n"
+    "bark and leaves are drawn procedurally.\n",
     "  texkit tree -o oak.glb --species oak --wind 8\n"
     "  texkit tree -o birch.glb --species birch --pieces 2000 --lods 3\n"
     "  texkit tree -o mine.txt --species birch\n"
