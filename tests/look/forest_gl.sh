@@ -41,9 +41,9 @@ check "forest_gl draws a forest, the same one again, and another one for another
 calls() {
     draw --count 1 --pieces 600 --headless a.png && one=$(value draws) || return 1
     draw --count 300 --pieces 8 --headless a.png || { cat err.log; return 1; }
-    [ "$(value trees)" = 300 ] && [ "$(value draws)" = "$one" ] || { cat out.log; return 1; }
+    [ "$(value trees)" = 300 ] && [ "$(value draws)" -le "$one" ] || { cat out.log; return 1; }
 }
-check "forest_gl needs as many draw calls for 300 trees as for one" calls
+check "forest_gl needs no more draw calls for 300 trees than for one" calls
 
 looks() {
     for option in --bare --wire "--time 3" "--wind 20" "--level 1" "--half 2" "--orbit 50,20,9" \
@@ -81,7 +81,7 @@ check "forest_gl: the shadow of a trunk begins at its foot" shadow
 
 near_leaves() {
     for metres in 0 4; do
-        "$forest" --shaders "$shaders" --count 1 --pieces 400 --size 120x90 --smooth 1 --orbit 20,3,4 --at 2,5,1 \
+        "$forest" --shaders "$shaders" --count 1 --pieces 400 --size 120x90 --smooth 1 --orbit 20,3,4 --at 0,9,3 \
             --cards $metres --headless n$metres.png >out.log 2>err.log || { cat err.log; return 1; }
         eval "calls$metres=$(value draws)"
     done
