@@ -5865,6 +5865,7 @@ typedef struct tmr_patch {
     int core, movable;                                  /* vertices: the four and their ring; those that move */
     int32_t live, live_faces, vertex_count, face_count; /* of the mesh                          */
     int32_t added;  /* vertex that the trial has added, -1 = none                               */
+    int lines_too;  /* vertices on lines may move, too                                          */
     double strain;  /* of all triangles before                                                  */
 } tmr_patch;
 
@@ -6008,18 +6009,22 @@ static double tmr_patch_strain(const tmr_work *w, const tmr_patch *patch) {
     return sum;
 }
 
-static void tmr_patch_relax_vertex(tmr_work *w, int32_t v) {
+static void tmr_patch_relax_vertex(tmr_work *w, const tmr_patch *patch, int32_t v) {
     const tmr_mesh *m = &w->m;
     tmr_place at;
-    if (m->corner[v] < 0 || tmr_kind_of(m, v) != TRIMESH_FREE) return;
-    if (m->flags[v] & (TMR_GHOST | TMR_PINNED) || !tmr_relaxed_place(w, v, &at)) return;
-    tmr_put(w, v, &at);
+    if (m->corner[v] < 0 || m->flags[v] & (TMR_GHOST | TMR_PINNED)) return;
+    if (tmr_kind_of(m, v) == TRIMESH_FREE) {
+        if (tmr_relaxed_place(w, v, &at)) tmr_put(w, v, &at);
+    } else if (patch->lines_too) {
+        tmr_relax_vertex(w, v);
+        if (tmr_has_moved(w, v)) tmr_put_on_line(w, v, w->moved[v], w->landed[v]);
+    }
 }
 
 /* Relax the vertices of the patch, each from where the others are now. */
 static void tmr_patch_relax(tmr_work *w, const tmr_patch *patch) {
-    if (patch->added >= 0) tmr_patch_relax_vertex(w, patch->added);
-    for (int i = 0; i < patch->movable; i++) tmr_patch_relax_vertex(w, patch->vertex[i].vertex);
+    if (patch->added >= 0) tmr_patch_relax_vertex(w, patch, patch->added);
+    for (int i = 0; i < patch->movable; i++) tmr_patch_relax_vertex(w, patch, patch->vertex[i].vertex);
 }
 
 enum { TMR_TRIAL_SWEEPS = 8, TMR_TRIAL_WIDE = 2 }; /* ours: of relaxation; after which it is widened */
@@ -6064,6 +6069,7 @@ typedef struct tmr_defects {
     tmr_patch *patch;
     uint8_t *was;   /* 1 per vertex: the mesh around it has changed in the last pass              */
     int32_t target; /* vertices                                                                   */
+    double price;   /* strain that a vertex is worth, for each one too many                       */
 } tmr_defects;
 
 /* Mark the patch as changed, in w->mask_room, if the trial has succeeded. */
@@ -6092,7 +6098,7 @@ static int tmr_try_removal(tmr_defects *d, int32_t c) {
     tmr_work *w = d->w;
     if (tmr_count_cost(&w->m, c, -1) > 0 || !tmr_can_collapse(&w->m, c)) return 0;
     if (!tmr_defect_keep(d, c) || !tmr_try_collapse(w, c, 0, 1)) return 0;
-    return tmr_defect_done(d, -TMR_VERTEX_PRICE * (w->m.live + 1 - d->target));
+    return tmr_defect_done(d, -d->price * (w->m.live + 1 - d->target));
 }
 
 /* A vertex is put in by a split of c's edge a b, which gives it four neighbours, and a flip of one of
@@ -6127,7 +6133,7 @@ static int tmr_try_insertions(tmr_defects *d, int32_t c) {
             continue;
         }
         tmr_flip(&w->m, y);
-        if (tmr_defect_done(d, TMR_VERTEX_PRICE * (w->m.live - 1 - d->target))) return 1;
+        if (tmr_defect_done(d, d->price * (w->m.live - 1 - d->target))) return 1;
     }
     return 0;
 }
@@ -6160,24 +6166,153 @@ static int32_t tmr_defect_pass(tmr_defects *d) {
     return steps;
 }
 
-/* Move and cancel the dislocations of a mesh that is nearly relaxed, at about target vertices. */
-static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+static txm_status tmr_defects_begin(tmr_defects *d, tmr_work *w, int32_t target, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
-    tmr_defects d;
-    d.w = w;
-    d.target = target;
-    d.patch = (tmr_patch *)txm_arena_alloc(scratch, 1, sizeof *d.patch);
-    d.was = (uint8_t *)txm_arena_alloc(scratch, (size_t)m->vertex_limit, 1);
-    if (!d.patch || !d.was) return TXM_OUT_OF_MEMORY;
+    d->w = w;
+    d->target = target;
+    d->price = TMR_VERTEX_PRICE;
+    d->patch = (tmr_patch *)txm_arena_zero(scratch, 1, sizeof *d->patch);
+    d->was = (uint8_t *)txm_arena_alloc(scratch, (size_t)m->vertex_limit, 1);
+    if (!d->patch || !d->was) return TXM_OUT_OF_MEMORY;
     w->pull = w->step = 1;
     w->length = tmr_ideal_length(w) * sqrt((double)m->live / target);
     memset(w->bad, 0, (size_t)m->vertex_limit);
     memset(w->flag, 0, (size_t)m->face_limit);
     memset(w->mask_room, 1, (size_t)m->vertex_limit);
-    for (int pass = 0; pass < TMR_DEFECT_PASSES; pass++) {
+    return TXM_OK;
+}
+
+/* Move and cancel the dislocations of a mesh that is nearly relaxed, at about target vertices. */
+static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+    tmr_defects d;
+    const txm_status status = tmr_defects_begin(&d, w, target, scratch);
+    for (int pass = 0; pass < TMR_DEFECT_PASSES && status == TXM_OK; pass++) {
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         if (tmr_defect_pass(&d) == 0) break;
     }
+    return status;
+}
+
+enum { TMR_COUNT_PASSES = 6 }; /* ours: at most                                                    */
+#define TMR_COUNT_PRICE 0.05   /* ours: strain that one vertex may cost in the first pass          */
+
+/* Bring a finished mesh from nearly the right number to the target: beside dislocations, where
+   that costs little strain, from pass to pass twice as much. Some may be left. */
+static txm_status tmr_count_beside_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+    tmr_mesh *m = &w->m;
+    tmr_defects d;
+    if (m->live == target) return TXM_OK;
+    const txm_status status = tmr_defects_begin(&d, w, target, scratch);
+    double price = TMR_COUNT_PRICE;
+    for (int pass = 0; pass < TMR_COUNT_PASSES && status == TXM_OK; pass++, price *= 2) {
+        if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
+        for (int32_t c = 0; c < 3 * m->face_count && m->live != target; c++) {
+            const int32_t missing = target - m->live;
+            if (!tmr_is_real_edge(m, c) || m->edge[c]) continue;
+            if (tmr_kind_of(m, m->vertex[tmr_next(c)]) != TRIMESH_FREE ||
+                tmr_kind_of(m, m->vertex[tmr_prev(c)]) != TRIMESH_FREE)
+                continue;
+            d.price = price / (missing < 0 ? -missing : missing);
+            if (missing < 0) tmr_try_removal(&d, c);
+            else tmr_try_insertions(&d, c);
+        }
+    }
+    return status;
+}
+
+/* ---- the worst triangles ------------------------------------------------------------------ */
+
+/* Where a surface is curved more tightly than triangles can follow, at tips, and between creases, some
+   triangles stay thin whatever relaxation does. Around each of these every flip, collapse and split is
+   tried, as with dislocations, until none helps. See docs/choices.md#slivers. */
+enum {
+    TMR_SLIVER_PASSES = 4, /* ours: over the mesh, at most                                        */
+    TMR_SLIVER_SHARE = 50  /* ours: one for so many vertices is tried; with more the input is thin */
+};
+#define TMR_SLIVER 0.75         /* ours: quality below which a triangle is worth it                  */
+#define TMR_SHORT_LINE 0.5      /* ours: two corners so close, in edge lengths, may become one       */
+
+static int tmr_is_sliver(const tmr_work *w, int32_t face) {
+    const tmr_mesh *m = &w->m;
+    const int32_t *v = m->vertex + 3 * face;
+    if (v[0] < 0 || tmr_is_ghost_face(m, face)) return 0;
+    return tmr_quality(m->p[v[0]], m->p[v[1]], m->p[v[2]],
+                       tmr_expected_normal(w, v[0], v[1], v[2])) < TMR_SLIVER;
+}
+
+/* May b = vertex[prev(c)], a corner, be merged into a = vertex[next(c)], another one, to which a short
+   line leads at which the mesh turns by less than 60 degrees? The lines of b end in a then. */
+static int tmr_can_merge(tmr_work *w, int32_t c) {
+    tmr_mesh *m = &w->m;
+    const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
+    const uint8_t flags = m->flags[b];
+    if (!m->edge[c] || tmr_edge_size(w, c) > TMR_SHORT_LINE) return 0;
+    const int32_t d = m->vertex[c], e = m->vertex[m->opposite[c]];
+    if (tmr_is_ghost(m, d) || tmr_is_ghost(m, e)) return 0;
+    const txm_dvec3 n = txm_d3_unit(txm_d3_area2(m->p[d], m->p[a], m->p[b]));
+    if (txm_d3_dot(n, txm_d3_unit(txm_d3_area2(m->p[e], m->p[b], m->p[a]))) < 0.5) return 0;
+    m->flags[b] = (uint8_t)(flags - TRIMESH_CORNER + TRIMESH_CREASE); /* otherwise it must stay */
+    const int can = tmr_can_collapse(m, c);
+    m->flags[b] = flags;
+    return can && tmr_collapse_is_fair(w, c, m->p[a], 0);
+}
+
+/* Collapse the edge opposite to c, on trial. */
+static int tmr_try_merge(tmr_work *w, tmr_patch *patch, int32_t c) {
+    tmr_mesh *m = &w->m;
+    const int corners = tmr_kind_of(m, m->vertex[tmr_next(c)]) == TRIMESH_CORNER &&
+                        tmr_kind_of(m, m->vertex[tmr_prev(c)]) == TRIMESH_CORNER;
+    /* where lines are spaced otherwise than the inside, what is on them stays */
+    if (m->edge[c] && (w->line_scale < 1 || w->line_scale > 1)) return 0;
+    if (corners && !tmr_can_merge(w, c)) return 0;
+    if (!tmr_patch_keep(w, patch, c)) return 0;
+    if (corners) tmr_collapse(m, c);
+    else if (!tmr_try_collapse(w, c, 0, 1)) return 0;
+    return tmr_patch_judge(w, patch, 0);
+}
+
+static int tmr_try_split(tmr_work *w, tmr_patch *patch, int32_t c) {
+    if (!tmr_patch_keep(w, patch, c)) return 0;
+    patch->added = tmr_split_edge(w, c);
+    return patch->added >= 0 && tmr_patch_judge(w, patch, 0);
+}
+
+static int tmr_try_turn(tmr_work *w, tmr_patch *patch, int32_t c) {
+    if (!tmr_can_flip(&w->m, c) || !tmr_patch_keep(w, patch, c)) return 0;
+    tmr_flip(&w->m, c);
+    return tmr_patch_judge(w, patch, 0);
+}
+
+static int32_t tmr_sliver_pass(tmr_work *w, tmr_patch *patch, int count_too, int32_t *budget) {
+    const int32_t faces = w->m.face_count;
+    int32_t steps = 0;
+    for (int32_t f = 0; f < faces && *budget > 0; f++) {
+        if (!tmr_is_sliver(w, f)) continue;
+        --*budget;
+        int done = 0;
+        for (int32_t c = 3 * f; c < 3 * f + 3 && !done; c++) done = tmr_try_turn(w, patch, c);
+        for (int32_t c = 3 * f; c < 3 * f + 3 && !done && count_too; c++) {
+            if (tmr_is_ghost(&w->m, w->m.vertex[w->m.opposite[c]])) continue;
+            done = tmr_try_merge(w, patch, c) || tmr_try_merge(w, patch, w->m.opposite[c]) ||
+                   tmr_try_split(w, patch, c);
+        }
+        steps += done;
+    }
+    return steps;
+}
+
+/* Mend the worst triangles. count_too: the number of vertices may change. */
+static txm_status tmr_mend_slivers(tmr_work *w, int count_too, txm_arena *scratch) {
+    tmr_mesh *m = &w->m;
+    tmr_patch *patch = (tmr_patch *)txm_arena_zero(scratch, 1, sizeof *patch);
+    if (!patch) return TXM_OUT_OF_MEMORY;
+    patch->lines_too = 1;
+    w->pull = w->step = 1;
+    memset(w->bad, 0, (size_t)m->vertex_limit);
+    memset(w->flag, 0, (size_t)m->face_limit);
+    int32_t budget = m->live / TMR_SLIVER_SHARE + 20;
+    for (int pass = 0; pass < TMR_SLIVER_PASSES; pass++)
+        if (tmr_sliver_pass(w, patch, count_too, &budget) == 0) break;
     return TXM_OK;
 }
 
@@ -7762,6 +7897,19 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     return status;
 }
 
+/* The worst triangles. Then there may be too few vertices or too many. */
+static txm_status tmr_mend_worst(tmr_work *w, int32_t target, txm_arena *scratch) {
+    int32_t missing;
+    txm_status status = tmr_mend_slivers(w, 1, scratch);
+    if (status != TXM_OK) return status;
+    tmr_improve_spots(w, 1);
+    status = tmr_mend_slivers(w, 1, scratch);
+    if (status != TXM_OK || w->m.live == target) return status;
+    status = tmr_count_beside_defects(w, target, scratch);
+    if (status == TXM_OK) status = tmr_fix_count(w, target, 2, scratch, &missing);
+    return status == TXM_OK ? tmr_mend_slivers(w, 0, scratch) : status;
+}
+
 /* The last part of every method: the exact number, and more regularity. */
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
@@ -7770,6 +7918,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     if (status == TXM_OK) status = tmr_improve(w, w->s->scale ? &tmr_polish_sizes : &tmr_polish_angles);
     if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
+    if ((status = tmr_mend_worst(w, target, scratch)) != TXM_OK) return status;
     if (w->m.live != target)
         return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
                                 (uint64_t)w->m.live, (uint64_t)target);

@@ -341,6 +341,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/count.h"
 #include "trimesh_relax/trial.h"
 #include "trimesh_relax/defects.h"
+#include "trimesh_relax/slivers.h"
 #include "trimesh_relax/subdivide.h"
 #include "trimesh_relax/validity.h"
 #include "trimesh_relax/join.h"

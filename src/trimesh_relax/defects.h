@@ -25,6 +25,7 @@ typedef struct tmr_defects {
     tmr_patch *patch;
     uint8_t *was;   /* 1 per vertex: the mesh around it has changed in the last pass              */
     int32_t target; /* vertices                                                                   */
+    double price;   /* strain that a vertex is worth, for each one too many                       */
 } tmr_defects;
 
 /* Mark the patch as changed, in w->mask_room, if the trial has succeeded. */
@@ -53,7 +54,7 @@ static int tmr_try_removal(tmr_defects *d, int32_t c) {
     tmr_work *w = d->w;
     if (tmr_count_cost(&w->m, c, -1) > 0 || !tmr_can_collapse(&w->m, c)) return 0;
     if (!tmr_defect_keep(d, c) || !tmr_try_collapse(w, c, 0, 1)) return 0;
-    return tmr_defect_done(d, -TMR_VERTEX_PRICE * (w->m.live + 1 - d->target));
+    return tmr_defect_done(d, -d->price * (w->m.live + 1 - d->target));
 }
 
 /* A vertex is put in by a split of c's edge a b, which gives it four neighbours, and a flip of one of
@@ -88,7 +89,7 @@ static int tmr_try_insertions(tmr_defects *d, int32_t c) {
             continue;
         }
         tmr_flip(&w->m, y);
-        if (tmr_defect_done(d, TMR_VERTEX_PRICE * (w->m.live - 1 - d->target))) return 1;
+        if (tmr_defect_done(d, d->price * (w->m.live - 1 - d->target))) return 1;
     }
     return 0;
 }
@@ -121,25 +122,58 @@ static int32_t tmr_defect_pass(tmr_defects *d) {
     return steps;
 }
 
-/* Move and cancel the dislocations of a mesh that is nearly relaxed, at about target vertices. */
-static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+static txm_status tmr_defects_begin(tmr_defects *d, tmr_work *w, int32_t target, txm_arena *scratch) {
     tmr_mesh *m = &w->m;
-    tmr_defects d;
-    d.w = w;
-    d.target = target;
-    d.patch = (tmr_patch *)txm_arena_alloc(scratch, 1, sizeof *d.patch);
-    d.was = (uint8_t *)txm_arena_alloc(scratch, (size_t)m->vertex_limit, 1);
-    if (!d.patch || !d.was) return TXM_OUT_OF_MEMORY;
+    d->w = w;
+    d->target = target;
+    d->price = TMR_VERTEX_PRICE;
+    d->patch = (tmr_patch *)txm_arena_zero(scratch, 1, sizeof *d->patch);
+    d->was = (uint8_t *)txm_arena_alloc(scratch, (size_t)m->vertex_limit, 1);
+    if (!d->patch || !d->was) return TXM_OUT_OF_MEMORY;
     w->pull = w->step = 1;
     w->length = tmr_ideal_length(w) * sqrt((double)m->live / target);
     memset(w->bad, 0, (size_t)m->vertex_limit);
     memset(w->flag, 0, (size_t)m->face_limit);
     memset(w->mask_room, 1, (size_t)m->vertex_limit);
-    for (int pass = 0; pass < TMR_DEFECT_PASSES; pass++) {
+    return TXM_OK;
+}
+
+/* Move and cancel the dislocations of a mesh that is nearly relaxed, at about target vertices. */
+static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+    tmr_defects d;
+    const txm_status status = tmr_defects_begin(&d, w, target, scratch);
+    for (int pass = 0; pass < TMR_DEFECT_PASSES && status == TXM_OK; pass++) {
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         if (tmr_defect_pass(&d) == 0) break;
     }
-    return TXM_OK;
+    return status;
+}
+
+enum { TMR_COUNT_PASSES = 6 }; /* ours: at most                                                    */
+#define TMR_COUNT_PRICE 0.05   /* ours: strain that one vertex may cost in the first pass          */
+
+/* Bring a finished mesh from nearly the right number to the target: beside dislocations, where
+   that costs little strain, from pass to pass twice as much. Some may be left. */
+static txm_status tmr_count_beside_defects(tmr_work *w, int32_t target, txm_arena *scratch) {
+    tmr_mesh *m = &w->m;
+    tmr_defects d;
+    if (m->live == target) return TXM_OK;
+    const txm_status status = tmr_defects_begin(&d, w, target, scratch);
+    double price = TMR_COUNT_PRICE;
+    for (int pass = 0; pass < TMR_COUNT_PASSES && status == TXM_OK; pass++, price *= 2) {
+        if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
+        for (int32_t c = 0; c < 3 * m->face_count && m->live != target; c++) {
+            const int32_t missing = target - m->live;
+            if (!tmr_is_real_edge(m, c) || m->edge[c]) continue;
+            if (tmr_kind_of(m, m->vertex[tmr_next(c)]) != TRIMESH_FREE ||
+                tmr_kind_of(m, m->vertex[tmr_prev(c)]) != TRIMESH_FREE)
+                continue;
+            d.price = price / (missing < 0 ? -missing : missing);
+            if (missing < 0) tmr_try_removal(&d, c);
+            else tmr_try_insertions(&d, c);
+        }
+    }
+    return status;
 }
 
 #endif /* TRIMESH_RELAX_DEFECTS_H */

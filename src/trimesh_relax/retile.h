@@ -4,6 +4,7 @@
 #include "fields.h"
 #include "count.h"
 #include "defects.h"
+#include "slivers.h"
 #include "subdivide.h"
 #include "validity.h"
 #include "ridges.h"
@@ -109,6 +110,19 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     return status;
 }
 
+/* The worst triangles. Then there may be too few vertices or too many. */
+static txm_status tmr_mend_worst(tmr_work *w, int32_t target, txm_arena *scratch) {
+    int32_t missing;
+    txm_status status = tmr_mend_slivers(w, 1, scratch);
+    if (status != TXM_OK) return status;
+    tmr_improve_spots(w, 1);
+    status = tmr_mend_slivers(w, 1, scratch);
+    if (status != TXM_OK || w->m.live == target) return status;
+    status = tmr_count_beside_defects(w, target, scratch);
+    if (status == TXM_OK) status = tmr_fix_count(w, target, 2, scratch, &missing);
+    return status == TXM_OK ? tmr_mend_slivers(w, 0, scratch) : status;
+}
+
 /* The last part of every method: the exact number, and more regularity. */
 static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     int32_t missing;
@@ -117,6 +131,7 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     if (status == TXM_OK) status = tmr_improve(w, w->s->scale ? &tmr_polish_sizes : &tmr_polish_angles);
     if (status != TXM_OK) return status;
     tmr_improve_spots(w, 3);
+    if ((status = tmr_mend_worst(w, target, scratch)) != TXM_OK) return status;
     if (w->m.live != target)
         return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
                                 (uint64_t)w->m.live, (uint64_t)target);

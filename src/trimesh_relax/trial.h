@@ -60,6 +60,7 @@ typedef struct tmr_patch {
     int core, movable;                                  /* vertices: the four and their ring; those that move */
     int32_t live, live_faces, vertex_count, face_count; /* of the mesh                          */
     int32_t added;  /* vertex that the trial has added, -1 = none                               */
+    int lines_too;  /* vertices on lines may move, too                                          */
     double strain;  /* of all triangles before                                                  */
 } tmr_patch;
 
@@ -203,18 +204,22 @@ static double tmr_patch_strain(const tmr_work *w, const tmr_patch *patch) {
     return sum;
 }
 
-static void tmr_patch_relax_vertex(tmr_work *w, int32_t v) {
+static void tmr_patch_relax_vertex(tmr_work *w, const tmr_patch *patch, int32_t v) {
     const tmr_mesh *m = &w->m;
     tmr_place at;
-    if (m->corner[v] < 0 || tmr_kind_of(m, v) != TRIMESH_FREE) return;
-    if (m->flags[v] & (TMR_GHOST | TMR_PINNED) || !tmr_relaxed_place(w, v, &at)) return;
-    tmr_put(w, v, &at);
+    if (m->corner[v] < 0 || m->flags[v] & (TMR_GHOST | TMR_PINNED)) return;
+    if (tmr_kind_of(m, v) == TRIMESH_FREE) {
+        if (tmr_relaxed_place(w, v, &at)) tmr_put(w, v, &at);
+    } else if (patch->lines_too) {
+        tmr_relax_vertex(w, v);
+        if (tmr_has_moved(w, v)) tmr_put_on_line(w, v, w->moved[v], w->landed[v]);
+    }
 }
 
 /* Relax the vertices of the patch, each from where the others are now. */
 static void tmr_patch_relax(tmr_work *w, const tmr_patch *patch) {
-    if (patch->added >= 0) tmr_patch_relax_vertex(w, patch->added);
-    for (int i = 0; i < patch->movable; i++) tmr_patch_relax_vertex(w, patch->vertex[i].vertex);
+    if (patch->added >= 0) tmr_patch_relax_vertex(w, patch, patch->added);
+    for (int i = 0; i < patch->movable; i++) tmr_patch_relax_vertex(w, patch, patch->vertex[i].vertex);
 }
 
 enum { TMR_TRIAL_SWEEPS = 8, TMR_TRIAL_WIDE = 2 }; /* ours: of relaxation; after which it is widened */

@@ -197,11 +197,54 @@ static void test_number(void **state) {
     }
 }
 
+/* ---- slivers ----------------------------------------------------------------------------------- */
+
+static int slivers_of(const tmr_work *w) {
+    int count = 0;
+    for (int32_t f = 0; f < w->m.face_count; f++) count += tmr_is_sliver(w, f);
+    return count;
+}
+
+/* A vertex right beside another one: it goes, or a flip lets it move away. */
+static void test_slivers(void **state) {
+    (void)state;
+    for (int count_too = 0; count_too < 2; count_too++) {
+        tmr_work *w = begin_sheet();
+        const int32_t a = vertex_at(w, 9, 9), b = vertex_at(w, 10, 9);
+        const int32_t v = tmr_split_edge(w, tmr_prev(tmr_find_edge(&w->m, a, b)));
+        assert_true(v >= 0);
+        assert_int_equal(slivers_of(w), 4);
+        w->m.p[v] = txm_d3_mad(w->m.p[a], txm_d3_sub(w->m.p[b], w->m.p[a]), 0.05);
+        assert_int_equal(slivers_of(w), 2);
+        assert_int_equal(tmr_mend_slivers(w, count_too, &scratch), TXM_OK);
+        assert_true(slivers_of(w) <= (count_too ? 0 : 2));
+        if (!count_too) assert_int_equal(w->m.live, MOST + 1);
+        end_sheet();
+    }
+}
+
+/* The vertex that is missing is put in where one was taken out. */
+static void test_missing(void **state) {
+    (void)state;
+    tmr_work *w = begin_sheet();
+    const int32_t c = tmr_find_edge(&w->m, vertex_at(w, 9, 9), vertex_at(w, 10, 9));
+    assert_true(tmr_try_collapse(w, tmr_prev(c), 0, 1));
+    tmr_flip_valences(w, 3, 0.3);
+    for (int k = 0; k < 10; k++) tmr_relax(w);
+    assert_int_equal(w->m.live, MOST - 1);
+    assert_int_equal(inner_defects(w), 4);
+    assert_int_equal(tmr_count_beside_defects(w, MOST, &scratch), TXM_OK);
+    assert_int_equal(w->m.live, MOST);
+    end_sheet();
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_taken_back),
         cmocka_unit_test(test_pair_cancels),
         cmocka_unit_test(test_number),
+        cmocka_unit_test(test_slivers),
+        cmocka_unit_test(test_missing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
