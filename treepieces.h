@@ -95,9 +95,9 @@
      released afterwards.
 
    TIME   (one core of 2023; make bench measures yours)
-     About 0.5 microseconds to grow a piece that keeps clear of others, 0.35 without clearance, if the
-     memory was in use before (first access to fresh memory takes as long again), 0.06 to move its bone in the wind. The parallel-for hook
-     distributes trees.
+     About 0.35 microseconds to grow a piece that keeps clear of others, 0.22 without clearance, if the
+     memory was in use before (in fresh memory a tenth longer), 0.06 to move its bone in the wind. The
+     parallel-for hook distributes trees.
 
    THREADS
      No global state. Calls with different env and outputs may overlap; a kit and a forest may be
