@@ -345,7 +345,7 @@ void main() {
     card_at = center + side.x * right + side.y * up;
     card_leaf = vec2(side.x, -side.y) * 0.5 + 0.5;
     card_what = ivec2(c.center.w, c.right.w);
-    card_light = 0.7 + 0.6 * clamp(0.35 + 0.65 * dot(c.normal.xyz, frame.sun.xyz), 0.0, 1.0) +
+    card_light = 0.82 + 0.36 * clamp(0.35 + 0.65 * dot(c.normal.xyz, frame.sun.xyz), 0.0, 1.0) +
                  0.2 * max(0.0, dot(frame.forward.xyz, frame.sun.xyz));
     gl_Position = is_edge_on ? vec4(2.0) : vec4(card_at.xy, -card_at.z * 0.5, 1.0);
 }
@@ -485,9 +485,10 @@ void main() {
     /* the leaves of a cloud move against each other, less at its rim */
     vec2 shift = 0.02 * (1.0 - dot(at, at)) * (flutter.x * sin(9.0 * at.yx) + flutter.y * cos(7.0 * at.yx));
     vec3 texel = vec3((dot(at, at) < 1.0 ? at + shift : at) * 0.5 + 0.5, layer);
-    vec4 leaf = texture(impostors, texel);
-    float small = max(textureQueryLod(impostors, texel.xy).y, 0.0);
-    if (leaf.a * (1.0 + 0.25 * small) < 0.4 || shows_cards(sphere.xyz)) discard;
+    vec4 leaf = texture(impostors, texel, -1.0);
+    /* one threshold for all pixels would make smooth blobs of needles and small leaves */
+    float least = 0.2 + 0.5 * hash(gl_FragCoord.yx + 3.5);
+    if (leaf.a < least || shows_cards(sphere.xyz)) discard;
     vec4 near = textureGather(depths, texel);
     float depth = max(max(near.x, near.y), max(near.z, near.w));
     if (depth < -1.5) discard;
@@ -527,7 +528,7 @@ void main() {
     species = int(card.right.w);
     tint = tint_of(looks[c.x], c.w);
     normal = 1.2 * crown_normal(center, radius) + 0.55 * at + vec3(0.0, 0.25, 0.0);
-    own_light = 0.7 + 0.6 * clamp(0.35 + 0.65 * dot(card.normal.xyz, frame.sun.xyz), 0.0, 1.0);
+    own_light = 0.82 + 0.36 * clamp(0.35 + 0.65 * dot(card.normal.xyz, frame.sun.xyz), 0.0, 1.0);
     gl_Position = frame.view_projection * vec4(place, 1.0);
 }
 #endif

@@ -8,7 +8,7 @@
 
 /* The color of a point p of a card is that of its texel, times
 
-       (0.7 + 0.6 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.75 + 0.25 min(1, p.p))
+       (0.82 + 0.36 clamp(0.35 + 0.65 n.l) + 0.2 max(0, f.l)) * (0.75 + 0.25 min(1, p.p))
 
    with the normal n of the card, l towards the light and the forward axis f of the view: wrap
    lighting, light transmitted by leaves when the sun is behind them, and shade in the middle of the
@@ -17,7 +17,7 @@
    dots. */
 static float tpc_card_light(const treepieces_impostor_desc *d, const treepieces_card *card) {
     const float direct = txm_clampf(0.35f + 0.65f * tpc_dot(card->normal, d->light), 0, 1);
-    return 0.7f + 0.6f * direct + 0.2f * txm_maxf(0, tpc_dot(d->forward, d->light));
+    return 0.82f + 0.36f * direct + 0.2f * txm_maxf(0, tpc_dot(d->forward, d->light));
 }
 
 /* First and last of `count` pixels whose centres lie in low..high, where -1..1 is the image. */

@@ -61,7 +61,7 @@ static const char tpc_oak[] =
 static const char tpc_beech[] =
     "name beech\n" "flare 1.8\n" "stiffness 1.2\n"
     "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 0.95\n"
-    "leaf_shape oval\n" "leaf_count 30\n" "leaf_size 0.45\n" "cloud_kind layers\n" "cloud 1.25\n"
+    "leaf_shape oval\n" "leaf_count 48\n" "leaf_size 0.36\n" "cloud_kind layers\n" "cloud 1.25\n"
     "cloud_flat 0.5\n"
     "leaf_color 0.28 0.39 0.14\n" "bark_kind smooth\n" "bark_color 0.47 0.48 0.46\n"
     "order 0\n" "length 20\n" "radius 0.024\n" "taper 0.04\n" "segments 26\n"
@@ -158,7 +158,7 @@ static const char tpc_willow[] =
 
 static const char tpc_almond[] =
     "name almond\n" "flare 1.4\n"
-    "leaf_shape blossom\n" "leaf_count 22\n" "leaf_size 0.4\n" "cloud 0.42\n" "cloud_flat 0.9\n"
+    "leaf_shape blossom\n" "leaf_count 44\n" "leaf_size 0.28\n" "cloud 0.42\n" "cloud_flat 0.9\n"
     "leaf_color 0.94 0.76 0.8\n" "bark_kind lenticels\n" "bark_color 0.3 0.25 0.22\n"
     "order 0\n" "length 5.5\n" "radius 0.026\n" "taper 0.06\n" "segments 14\n"
     "start 0.2\n" "side 0.35\n" "fork 0.42\n" "triple 0.1\n" "fork_angle 32\n" "fork_ratio 0.95\n"
@@ -175,9 +175,9 @@ static const char tpc_almond[] =
 
 static const char tpc_pine[] =
     "name pine\n" "flare 1.4\n"
-    "leaf_shape needle\n" "leaf_count 26\n" "leaf_size 0.42\n" "cloud_kind shoots\n" "cloud 0.95\n"
+    "leaf_shape needle\n" "leaf_count 32\n" "leaf_size 0.66\n" "cloud_kind shoots\n" "cloud 0.95\n"
     "cloud_flat 0.32\n"
-    "leaf_color 0.24 0.35 0.19\n" "bark_kind plates\n" "bark_color 0.55 0.36 0.24\n"
+    "leaf_color 0.23 0.335 0.185\n" "bark_kind plates\n" "bark_color 0.55 0.36 0.24\n"
     "order 0\n" "length 18\n" "radius 0.018\n" "taper 0.06\n" "segments 30\n"
     "start 0.5\n" "side 0.35\n" "pair 0.25\n" "fork 0.1\n" "fork_angle 30\n"
     "wander 5\n" "tropism 0.08\n" "leaves 0.9\n" "leaves_start 0.9\n"
@@ -195,9 +195,9 @@ static const char tpc_pine[] =
 
 static const char tpc_spruce[] =
     "name spruce\n" "flare 1.4\n"
-    "leaf_shape needle\n" "leaf_count 16\n" "leaf_size 0.75\n" "cloud_kind layers\n" "cloud 0.6\n"
+    "leaf_shape needle\n" "leaf_count 26\n" "leaf_size 0.9\n" "cloud_kind layers\n" "cloud 0.6\n"
     "cloud_flat 0.5\n"
-    "leaf_color 0.2 0.31 0.19\n" "bark_kind plates\n" "bark_color 0.38 0.3 0.25\n"
+    "leaf_color 0.19 0.295 0.18\n" "bark_kind plates\n" "bark_color 0.38 0.3 0.25\n"
     "order 0\n" "length 22\n" "radius 0.014\n" "taper 0.03\n" "segments 64\n"
     "start 0.04\n" "side 0.05\n" "pair 0.95\n" "fork 0\n"
     "wander 1\n" "tropism 0.3\n" "leaves 1\n" "leaves_start 0.96\n"

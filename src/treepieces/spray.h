@@ -11,7 +11,7 @@
    Lengths are in sides of the image, y points down. */
 enum {
     TPC_TWIG = TREEPIECES_LEAF_COMPOUND + 1, /* shape of a mark: a tapering stroke */
-    TPC_MARKS = 1024,
+    TPC_MARKS = 2048,
     TPC_SAMPLES = 4 /* per pixel, across and down */
 };
 
@@ -43,9 +43,9 @@ typedef struct tpc_habit {
 } tpc_habit;
 
 static const tpc_habit tpc_habits[] = {
-    {9, 8, 8, 0.15f, 0.32f, 0.015f, 58, 0.10f},   {7, 7, 6, 0.20f, 0.34f, 0.01f, 55, 0.06f},
+    {13, 12, 9, 0.105f, 0.31f, 0.012f, 55, 0.08f}, {7, 7, 6, 0.20f, 0.34f, 0.01f, 55, 0.06f},
     {15, 6, 11, 0.20f, 0.085f, 0.02f, 38, 0.14f}, {8, 8, 8, 0.125f, 0.44f, 0.04f, 62, 0.06f},
-    {0, 11, 0, 0.13f, 0.034f, 0, 48, 0.05f},      {7, 6, 4, 0.09f, 0.42f, 0.05f, 75, 0},
+    {0, 13, 0, 0.07f, 0.042f, 0, 50, 0.05f},      {15, 7, 9, 0.058f, 0.42f, 0.075f, 80, 0},
     {6, 7, 5, 0.19f, 0.19f, 0.05f, 62, 0.04f},    {5, 5, 3, 0.32f, 0.30f, 0.02f, 55, 0.08f},
 };
 
@@ -352,8 +352,8 @@ static void tpc_add_flower(tpc_spray *s, const float at[2], float radius) {
             petal->color[k] = txm_lerpf(deep[k], petal->tip[k], 0.4f);
         }
     }
-    for (int i = 0; i < 9; i++) {
-        const float angle = 40 * (float)i + 15 * tpc_signed(&s->rng);
+    for (int i = 0; i < 5; i++) {
+        const float angle = 72 * (float)i + 15 * tpc_signed(&s->rng);
         float tip[2], top[2];
         tpc_advance(at, up, angle, radius * (0.2f + 0.2f * txm_rng_float(&s->rng)), 0.01f, tip);
         tpc_advance(tip, up, angle, 0.07f * radius, 0.01f, top);
@@ -382,32 +382,62 @@ static void tpc_add_foliage(tpc_spray *s, const tpc_stem *stem, int count, float
         }
         if (is_last || txm_rng_float(&s->rng) < 0.35f)
             tpc_add_leaf(s, TREEPIECES_LEAF_LANCE, at, heading, -0.6f * angle, 0.4f, young);
-        tpc_advance(at, heading, angle, habit->petiole, 0.13f, middle);
+        const float around = 180 * tpc_signed(&s->rng), off = sqrtf(txm_rng_float(&s->rng));
+        tpc_advance(at, heading, around, off * habit->petiole, 0.09f, middle);
         tpc_add_flower(s, middle, habit->length * (0.85f + 0.25f * txm_rng_float(&s->rng)));
     }
 }
 
-/* Add needles on both sides of a twig and towards the viewer. */
-static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first) {
+/* Add needles all round a shoot, those at its tip forwards. long_by: their length over the usual. They
+   are so dense that smaller pictures of them do not vanish. */
+static void tpc_add_needles(tpc_spray *s, const tpc_stem *stem, float first, float long_by) {
     const tpc_habit *habit = &tpc_habits[TREEPIECES_LEAF_NEEDLE];
     const float dx = stem->to[0] - stem->from[0], dy = stem->to[1] - stem->from[1];
-    const int count = (int)((1 - first) * sqrtf(dx * dx + dy * dy) / 0.0085f) + 4;
+    const float covered = (1 - first) * sqrtf(dx * dx + dy * dy);
+    const int count = (int)(covered / (0.0024f + 0.0016f * long_by)) + 4;
     for (int i = 0; i < count; i++) {
         const float along = first + (1 - first) * (float)i / (float)(count - 1);
-        const float spread = i % 5 == 4 ? 0.35f * tpc_signed(&s->rng) : i % 2 ? 1.0f : -1.0f;
-        const float angle = spread * habit->angle * (1.15f - 0.75f * along * along);
-        const float length = habit->length * (0.7f + 0.45f * txm_rng_float(&s->rng));
+        const float spread = i % 5 == 4 ? 0.5f * tpc_signed(&s->rng) : i % 2 ? 1.0f : -1.0f;
+        const float angle = spread * habit->angle * (1.1f - 0.75f * along * along);
+        const float length = long_by * habit->length * (0.7f + 0.45f * txm_rng_float(&s->rng));
         float at[2], heading[2], tip[2], color[3];
         tpc_stem_at(stem, along, at, heading);
         tpc_vary_color(s, s->species->leaf_color, color);
-        tpc_advance(at, heading, angle + 12 * tpc_signed(&s->rng), length, 0.01f, tip);
+        tpc_advance(at, heading, angle + 9 * tpc_signed(&s->rng), length, 0.01f, tip);
         tpc_mark *m = tpc_add_mark(s, TREEPIECES_LEAF_NEEDLE, at, tip, habit->width * habit->length,
                                    habit->bend * tpc_signed(&s->rng), color);
         for (int k = 0; m && k < 3; k++) {
-            m->color[k] = color[k];
-            m->tip[k] = 1.3f * color[k] + 0.04f;
+            m->color[k] = 0.75f * color[k];
+            m->tip[k] = 1.2f * color[k] + 0.01f;
         }
     }
+}
+
+/* A spray of needles: thin shoots with gaps between them. Of pines there are few, from the foot of the
+   spray, with long needles; of others they stand along a stem, and are the shorter the higher. */
+static void tpc_make_shoots(tpc_spray *s) {
+    const int is_tuft = s->species->cloud_kind == TREEPIECES_CLOUD_SHOOTS;
+    const int twigs = is_tuft ? 6 : tpc_habits[TREEPIECES_LEAF_NEEDLE].twigs;
+    const float long_by = is_tuft ? 2.6f : 1;
+    tpc_stem stem = {{0.5f, 1}, {0.5f, is_tuft ? 0.17f : 0.07f}, 0};
+    stem.to[0] += 0.06f * tpc_signed(&s->rng);
+    stem.bend = 0.05f * tpc_signed(&s->rng);
+    tpc_add_stem(s, &stem, 0.008f, 0.003f);
+    for (int i = 0; i < twigs; i++) {
+        const float along = (is_tuft ? 0.25f : 0.04f) + (is_tuft ? 0.4f : 0.8f) * (float)i / (float)twigs;
+        const float side = i % 2 ? -1.0f : 1.0f;
+        const float length = (is_tuft ? 0.36f : 0.34f * (1.02f - 0.7f * along)) *
+                             (0.8f + 0.35f * txm_rng_float(&s->rng));
+        const float angle = side * (is_tuft ? 50 - 45 * along : 44 - 10 * along) + 7 * tpc_signed(&s->rng);
+        tpc_stem twig;
+        float heading[2];
+        tpc_stem_at(&stem, along, twig.from, heading);
+        tpc_advance(twig.from, heading, angle, length, 0.07f * long_by, twig.to);
+        twig.bend = -0.07f * side;
+        tpc_add_stem(s, &twig, 0.005f, 0.002f);
+        tpc_add_needles(s, &twig, is_tuft ? 0.35f : 0.06f, long_by);
+    }
+    tpc_add_needles(s, &stem, is_tuft ? 0.5f : 0.03f, long_by);
 }
 
 /* A spray for hanging strips: long shoots side by side, of different lengths. */
@@ -429,11 +459,9 @@ static void tpc_make_strips(tpc_spray *s) {
    sides. */
 static void tpc_make_spray(tpc_spray *s) {
     const tpc_habit *habit = &tpc_habits[s->shape];
-    const int is_needle = s->shape == TREEPIECES_LEAF_NEEDLE;
-    const float top = is_needle ? 0.12f : 0.97f * habit->length + 0.03f;
     tpc_stem stem = {{0.5f, 1}, {0.5f, 0}, 0};
     stem.to[0] += 0.06f * tpc_signed(&s->rng);
-    stem.to[1] = top;
+    stem.to[1] = 0.97f * habit->length + 0.03f;
     stem.bend = 0.05f * tpc_signed(&s->rng);
     tpc_add_stem(s, &stem, 0.010f, 0.003f);
     for (int i = 0; i < habit->twigs; i++) {
@@ -446,11 +474,9 @@ static void tpc_make_spray(tpc_spray *s) {
         tpc_advance(twig.from, heading, angle, length, 0.12f, twig.to);
         twig.bend = -0.08f * side;
         tpc_add_stem(s, &twig, 0.006f, 0.0025f);
-        if (is_needle) tpc_add_needles(s, &twig, 0.08f);
-        else tpc_add_foliage(s, &twig, habit->twig_leaves, 0.25f, 0.85f);
+        tpc_add_foliage(s, &twig, habit->twig_leaves, 0.25f, 0.85f);
     }
-    if (is_needle) tpc_add_needles(s, &stem, 0.03f);
-    else tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 0.88f);
+    tpc_add_foliage(s, &stem, habit->leaves, 0.14f, 0.88f);
 }
 
 TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *species, uint64_t seed,
@@ -472,8 +498,8 @@ TREEPIECES_API txm_status treepieces_draw_leaves(const treepieces_species *speci
     spray.species = species;
     spray.shape = txm_clampi(species->leaf_shape, 0, TREEPIECES_LEAF_COMPOUND);
     spray.rng = txm_rng_make(seed, 0x59a7);
-    const int is_needle = spray.shape == TREEPIECES_LEAF_NEEDLE;
-    if (status == TXM_OK && species->cloud_kind == TREEPIECES_CLOUD_STRIPS && !is_needle)
+    if (status == TXM_OK && spray.shape == TREEPIECES_LEAF_NEEDLE) tpc_make_shoots(&spray);
+    else if (status == TXM_OK && species->cloud_kind == TREEPIECES_CLOUD_STRIPS)
         tpc_make_strips(&spray);
     else if (status == TXM_OK) tpc_make_spray(&spray);
     for (int y = 0; y < out.height && status == TXM_OK; y += ROWS) {

@@ -194,6 +194,53 @@ static void test_leaves(void **state) {
     for (int shape = 0; shape < SHAPES; shape++) free(shapes[shape].pixels);
 }
 
+/* Smaller pictures, as textures seen from afar are, show about as much above half transparency. */
+static void test_leaves_from_afar(void **state) {
+    (void)state;
+    enum { LARGE = 256, BLOCK = 16 };
+    for (int i = 0; i <= SHAPES; i++) { /* the last: needles of pines */
+        treepieces_species s = shaped(i < SHAPES ? i : TREEPIECES_LEAF_NEEDLE);
+        if (i == SHAPES) s.cloud_kind = TREEPIECES_CLOUD_SHOOTS;
+        txm_image image = make_image(LARGE, LARGE, 4, TXM_U8);
+        long near = 0, afar = 0;
+        assert_int_equal(treepieces_draw_leaves(&s, 5, NULL, image), TXM_OK);
+        for (int block = 0; block < LARGE / BLOCK * (LARGE / BLOCK); block++) {
+            const int x = block % (LARGE / BLOCK) * BLOCK, y = block / (LARGE / BLOCK) * BLOCK;
+            long sum = 0;
+            for (int k = 0; k < BLOCK * BLOCK; k++) {
+                const int alpha = rgba(&image, x + k % BLOCK, y + k / BLOCK)[3];
+                near += alpha > 127;
+                sum += alpha;
+            }
+            afar += sum > 127 * BLOCK * BLOCK ? BLOCK * BLOCK : 0;
+        }
+        assert_in_range(afar, near / 2, near * 3 / 2);
+        free(image.pixels);
+    }
+}
+
+/* Pines have longer needles than other conifers, in a wider spray. */
+static void test_needles(void **state) {
+    (void)state;
+    int width[2];
+    for (int i = 0; i < 2; i++) {
+        treepieces_species s = shaped(TREEPIECES_LEAF_NEEDLE);
+        int low = 2 * SIDE, high = -1;
+        s.cloud_kind = i ? TREEPIECES_CLOUD_SHOOTS : TREEPIECES_CLOUD_LAYERS;
+        txm_image image = make_image(2 * SIDE, 2 * SIDE, 4, TXM_U8);
+        assert_int_equal(treepieces_draw_leaves(&s, 5, NULL, image), TXM_OK);
+        for (int x = 0; x < 2 * SIDE; x++) /* in the upper half, where others taper */
+            for (int y = SIDE / 4; y < SIDE; y++) {
+                if (rgba(&image, x, y)[3] < 128) continue;
+                if (x < low) low = x;
+                high = x;
+            }
+        width[i] = high - low;
+        free(image.pixels);
+    }
+    assert_true(width[1] > width[0] + SIDE / 8);
+}
+
 /* Strips are several shoots side by side, all other sprays grow from one stem. Needles do not hang. */
 static void test_strips(void **state) {
     (void)state;
@@ -376,7 +423,7 @@ static double light_of(const treepieces_impostor_desc *d, const treepieces_card 
     }
     lit = 0.35 + 0.65 * lit;
     lit = lit < 0 ? 0 : lit > 1 ? 1 : lit;
-    return 0.7 + 0.6 * lit + 0.2 * (through > 0 ? through : 0);
+    return 0.82 + 0.36 * lit + 0.2 * (through > 0 ? through : 0);
 }
 
 static int agrees(const treepieces_impostor_desc *d, const txm_image *color,
@@ -804,7 +851,9 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cloud),           cmocka_unit_test(test_looks),
         cmocka_unit_test(test_cloud_spread),    cmocka_unit_test(test_cloud_kinds),
-        cmocka_unit_test(test_leaves),          cmocka_unit_test(test_strips),
+        cmocka_unit_test(test_leaves),          cmocka_unit_test(test_leaves_from_afar),
+        cmocka_unit_test(test_needles),
+        cmocka_unit_test(test_strips),
         cmocka_unit_test(test_leaves_repeat),   cmocka_unit_test(test_leaves_sizes),
         cmocka_unit_test(test_leaves_refusals), cmocka_unit_test(test_impostor),
         cmocka_unit_test(test_impostor_behind), cmocka_unit_test(test_impostor_card),
