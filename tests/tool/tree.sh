@@ -128,6 +128,10 @@ check "nothing is beside it" sh -c "! ls | grep -q 'tree-.*ply'"
 rm -f ./*.obj ./*.ply
 
 # ---- species from text
+check "the species of the manual grows" run 0 tree -o acacia.glb --species "$root/docs/trees/acacia.txt" \
+    --pieces 200 --sheet 128
+check "and the manual tells its lines" awk 'NR == FNR { sub(/^ +/, ""); told[$0] = 1; next }
+    /^[a-z]/ && !($0 in told) { print "not told: " $0; exit 1 }' "$root/docs/trees.md" "$root/docs/trees/acacia.txt"
 check "the species as text" run 0 tree -o mine.txt --species birch
 check "is refused with the line where it is wrong" sh -c "
     sed 's/^leaf_count .*/leaf_count many/' mine.txt >wrong.txt"
