@@ -26,6 +26,7 @@ $(TESTS)/modules/textiles.o: OPTIONS = -DTEXTILES_MAX_PIXELS=4194304
 # their tests compute for long: nearly twice as fast for some seconds more of the compiler. (-O2 takes it
 # twice as long again, for another fifth)
 $(TESTS)/modules/texsyn.o: OPTIONS = -O1
+$(TESTS)/modules/texpatch.o: OPTIONS = -O1
 $(TESTS)/modules/trimesh_relax.o: OPTIONS = -O1
 
 $(TESTS)/modules/%.o: src/%.h tests/build.mk

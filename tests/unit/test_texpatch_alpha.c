@@ -126,6 +126,7 @@ static void make_all(int hidden, txm_image out[5]) {
 
 static void test_hidden_everywhere(void **state) {
     (void)state;
+    tk_wide();
     txm_image out[3][5];
     for (int hidden = 0; hidden < 3; hidden++) {
         make_all(hidden, out[hidden]);

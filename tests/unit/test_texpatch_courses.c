@@ -128,6 +128,7 @@ static void test_planks(void **state) {
 
 static void test_plane(void **state) {
     (void)state;
+    tk_wide();
     static const wall w = {BOND_RANDOM, 96, 24, 0};
     const txm_image bricks = draw_wall(&w, 240, 190);
     const texpatch_exemplar e = exemplar_of(&bricks);
@@ -154,6 +155,7 @@ static txm_status begin_it(void *context, txm_env *env) {
 
 static void test_no_memory(void **state) {
     (void)state;
+    tk_wide();
     static const wall w = {BOND_RANDOM, 96, 24, 0};
     const txm_image bricks = draw_wall(&w, 240, 190);
     const texpatch_exemplar e = exemplar_of(&bricks);

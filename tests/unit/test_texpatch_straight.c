@@ -186,6 +186,7 @@ static void test_floor(void **state) {
 
 static void test_turned(void **state) {
     (void)state;
+    tk_wide();
     const shot s = {8, 40, 14, 1, 0, 0.05, 0}, t = {0, 0, -15, 1, 0, 0.05, 0};
     for (int p = 0; p < CLOTH; p++) {
         check_shot((pattern)p, &s, 320, 320, 20);
@@ -195,6 +196,7 @@ static void test_turned(void **state) {
 
 static void test_lens(void **state) {
     (void)state;
+    tk_wide();
     const shot s = {0, 0, 0, 1, 0.15, 0.05, 0}, t = {15, 70, 5, 0.8, -0.1, 0.05, 0};
     for (int p = 0; p < PATTERNS; p++) {
         check_shot((pattern)p, &s, 384, 288, 20);
@@ -206,6 +208,7 @@ static void test_lens(void **state) {
    field the error is twice as large. */
 static void test_wavy(void **state) {
     (void)state;
+    tk_wide();
     static const pattern patterns[] = {BRICK, THIRD_BRICK, TILES, CHEQUERS, CLOTH, TILES, CLOTH};
     for (int i = 0; i < 7; i++) {
         const shot s = {i < 5 ? 10 : 0, 80, 0, 1, 0, 0.05, i < 5 ? 0.02 : 0.03};
@@ -428,6 +431,7 @@ static txm_status draw_it(void *context, txm_env *env) {
 
 static void test_sweep(void **state) {
     (void)state;
+    tk_wide();
     const shot s = {20, 80, 10, 1, 0, 0, 0};
     finding f;
     f.photo = photograph(TILES, &s, 120, 80, 12);

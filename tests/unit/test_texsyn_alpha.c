@@ -116,6 +116,7 @@ static void test_synthesis(void **state) {
 /* With a mask, of few visible pixels, of none at all. */
 static void test_scarce(void **state) {
     (void)state;
+    tk_wide();
     for (int kind = 0; kind < 3; kind++) {
         for (int h = 0; h < HIDDEN; h++) {
             texsyn_learn_desc learn;
@@ -195,6 +196,7 @@ static void test_fill(void **state) {
 /* A model of a cutout fills another one in another light. */
 static void test_fill_relit(void **state) {
     (void)state;
+    tk_wide();
     draw_all();
     for (int i = 0; i < PIXELS; i++) mask[i] = i % SIDE > 40 ? 255 : 0;
     for (int h = 0; h < HIDDEN; h++) {
@@ -251,6 +253,7 @@ static void test_knit(void **state) {
 /* Two textures, one of which is a cutout, or both are; or nothing of one is visible. */
 static void test_composite(void **state) {
     (void)state;
+    tk_wide();
     static uint8_t labels[PIXELS], drawn[OUT * OUT];
     for (int i = 0; i < PIXELS; i++) labels[i] = i / SIDE > 30;
     for (int i = 0; i < OUT * OUT; i++) drawn[i] = i % OUT > 30;
