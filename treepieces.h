@@ -2567,7 +2567,7 @@ static int tpc_most_joined(float stretch) {
 /* A piece as the grammar has it. */
 typedef struct tpc_segment {
     uint64_t seed;
-    float position[3], rotation[4]; /* of the piece, in the world                               */
+    float position[3], rotation[4]; /* of the piece, as of the rim in tpc_bud                   */
     float stem[3];                  /* its axis, unit length                                    */
     float radius, length, ratios[TREEPIECES_MAX_LEAVES]; /* metres; over radius                 */
     float part;                     /* of its length that bears the branches, a piece of its own */
@@ -2702,7 +2702,8 @@ typedef struct tpc_bud {
     uint8_t is_forked, is_aimed;  /* after a fork, where `start` no longer applies; `aim` is the
                                      direction of the piece after this one                      */
     uint16_t depth;
-    float position[3], rotation[4], axis[3]; /* of the rim; axis: its y axis                    */
+    float position[3], rotation[4], axis[3]; /* of the rim, from the foot of the tree, but turned as
+                                     in the world; axis: its y axis                             */
     float heading[3];             /* of growth                                                  */
     float aim[3];
     float radius, end_radius;     /* here, and at the end of the axis                           */
@@ -2816,9 +2817,8 @@ static const tpc_wait *tpc_pop(tpc_growth *g) {
 static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     const treepieces_species *s = g->species;
     if (s->envelope == TREEPIECES_FREE) return 0;
-    const float x = bud->position[0] - g->place.position[0];
-    const float z = bud->position[2] - g->place.position[2];
-    const float y = (bud->position[1] - g->place.position[1]) / g->trunk;
+    const float x = bud->position[0], z = bud->position[2];
+    const float y = bud->position[1] / g->trunk;
     const float h = (y - s->crown_base) / (s->crown_top - s->crown_base);
     if (h > 1) return 1;
     if (bud->order == 0) return 0;
@@ -2834,7 +2834,7 @@ static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3])
     const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
     for (int k = 0; k < 3; k++) {
         const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
-        const float at = (position[k] - g->place.position[k]) / side + middle;
+        const float at = position[k] / side + middle;
         cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
     }
     return side;
@@ -2869,7 +2869,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
         tpc_is_shaded(g, bud) || bud->position[1] > g->ceiling)
         return TREEPIECES_TIP;
     /* a hanging axis ends before it reaches the ground */
-    if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < tpc_clearance * g->trunk)
+    if (bud->heading[1] < 0 && bud->position[1] < tpc_clearance * g->trunk)
         return TREEPIECES_TIP;
     if (g->desc->rule == TREEPIECES_ALTERNATE) return bud->depth & 1 ? TREEPIECES_Y : TREEPIECES_I;
     if (g->desc->rule == TREEPIECES_RANDOM)
@@ -2961,7 +2961,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
 
 /* The first axes decide how high the tree is: others rise less and less under a dome as high, and end there. */
 static void tpc_limit_rise(const tpc_growth *g, tpc_bud *bud) {
-    const float x = bud->position[0] - g->place.position[0], z = bud->position[2] - g->place.position[2];
+    const float x = bud->position[0], z = bud->position[2];
     const float room = g->ceiling - bud->position[1] - tpc_dome * (x * x + z * z) / g->trunk;
     if (bud->heading[1] * 3 * bud->step <= room || bud->heading[1] <= 0) return;
     bud->heading[1] = txm_maxf(room / (3 * bud->step), 0);
@@ -3259,7 +3259,7 @@ static int tpc_call_rule(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c
     site.parent = bud->parent < 0 ? -1 : g->sketch.segments[bud->parent].type;
     site.rim = bud->rim;
     site.tree = g->index;
-    memcpy(site.position, bud->position, sizeof site.position);
+    for (int k = 0; k < 3; k++) site.position[k] = bud->position[k] + g->place.position[k];
     memcpy(site.direction, bud->heading, sizeof site.direction);
     site.radius = bud->radius;
     site.along = bud->along;
@@ -3310,7 +3310,6 @@ static void tpc_begin_tree(tpc_growth *g, tpc_bud *bud) {
     g->foot = g->trunk * o->radius;
     bud->parent = TREEPIECES_NONE;
     bud->seed = g->place.seed;
-    memcpy(bud->position, g->place.position, sizeof bud->position);
     double sine, cosine;
     txm_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
     bud->rotation[1] = txm_float(sine);
@@ -3626,7 +3625,7 @@ static void tpc_append_node(tpc_growth *g, const tpc_part *part, int32_t parent,
     g->bands[g->node_count] = tpc_bands(g, part, across);
     g->type_counts[part->type]++;
     g->node_count++;
-    g->height = txm_maxf(g->height, part->first->position[1] - g->place.position[1]);
+    g->height = txm_maxf(g->height, part->first->position[1]);
     if (part->foliage > 0) tpc_add_cluster(g, part);
 }
 
@@ -3671,7 +3670,12 @@ static void tpc_assemble_axis(tpc_growth *g, const tpc_axis *axis) {
             part.type = TREEPIECES_I;
             part.length = sqrtf(tpc_dot(chord, chord));
             part.ratio = next->radius / t->radius;
-            for (int k = 0; k < 3; k++) chord[k] /= part.length;
+            if (part.length > 0)
+                for (int k = 0; k < 3; k++) chord[k] /= part.length;
+            else { /* too short for its square */
+                part.length = t->length;
+                memcpy(chord, t->stem, sizeof chord);
+            }
             turn = (int)((t->seed >> 32) % TREEPIECES_RIM);
             tpc_turn_to(y, chord, frame, rotation);
             tpc_multiply(rotation, tpc_turns[turn], rotation);

@@ -113,7 +113,7 @@ static void tpc_append_node(tpc_growth *g, const tpc_part *part, int32_t parent,
     g->bands[g->node_count] = tpc_bands(g, part, across);
     g->type_counts[part->type]++;
     g->node_count++;
-    g->height = txm_maxf(g->height, part->first->position[1] - g->place.position[1]);
+    g->height = txm_maxf(g->height, part->first->position[1]);
     if (part->foliage > 0) tpc_add_cluster(g, part);
 }
 
@@ -158,7 +158,12 @@ static void tpc_assemble_axis(tpc_growth *g, const tpc_axis *axis) {
             part.type = TREEPIECES_I;
             part.length = sqrtf(tpc_dot(chord, chord));
             part.ratio = next->radius / t->radius;
-            for (int k = 0; k < 3; k++) chord[k] /= part.length;
+            if (part.length > 0)
+                for (int k = 0; k < 3; k++) chord[k] /= part.length;
+            else { /* too short for its square */
+                part.length = t->length;
+                memcpy(chord, t->stem, sizeof chord);
+            }
             turn = (int)((t->seed >> 32) % TREEPIECES_RIM);
             tpc_turn_to(y, chord, frame, rotation);
             tpc_multiply(rotation, tpc_turns[turn], rotation);

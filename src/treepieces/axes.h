@@ -13,7 +13,7 @@ static int tpc_call_rule(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c
     site.parent = bud->parent < 0 ? -1 : g->sketch.segments[bud->parent].type;
     site.rim = bud->rim;
     site.tree = g->index;
-    memcpy(site.position, bud->position, sizeof site.position);
+    for (int k = 0; k < 3; k++) site.position[k] = bud->position[k] + g->place.position[k];
     memcpy(site.direction, bud->heading, sizeof site.direction);
     site.radius = bud->radius;
     site.along = bud->along;
@@ -64,7 +64,6 @@ static void tpc_begin_tree(tpc_growth *g, tpc_bud *bud) {
     g->foot = g->trunk * o->radius;
     bud->parent = TREEPIECES_NONE;
     bud->seed = g->place.seed;
-    memcpy(bud->position, g->place.position, sizeof bud->position);
     double sine, cosine;
     txm_sincos(0.5 * (double)g->place.turn, &sine, &cosine);
     bud->rotation[1] = txm_float(sine);

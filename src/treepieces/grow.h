@@ -35,7 +35,8 @@ typedef struct tpc_bud {
     uint8_t is_forked, is_aimed;  /* after a fork, where `start` no longer applies; `aim` is the
                                      direction of the piece after this one                      */
     uint16_t depth;
-    float position[3], rotation[4], axis[3]; /* of the rim; axis: its y axis                    */
+    float position[3], rotation[4], axis[3]; /* of the rim, from the foot of the tree, but turned as
+                                     in the world; axis: its y axis                             */
     float heading[3];             /* of growth                                                  */
     float aim[3];
     float radius, end_radius;     /* here, and at the end of the axis                           */
@@ -149,9 +150,8 @@ static const tpc_wait *tpc_pop(tpc_growth *g) {
 static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     const treepieces_species *s = g->species;
     if (s->envelope == TREEPIECES_FREE) return 0;
-    const float x = bud->position[0] - g->place.position[0];
-    const float z = bud->position[2] - g->place.position[2];
-    const float y = (bud->position[1] - g->place.position[1]) / g->trunk;
+    const float x = bud->position[0], z = bud->position[2];
+    const float y = bud->position[1] / g->trunk;
     const float h = (y - s->crown_base) / (s->crown_top - s->crown_base);
     if (h > 1) return 1;
     if (bud->order == 0) return 0;
@@ -167,7 +167,7 @@ static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3])
     const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
     for (int k = 0; k < 3; k++) {
         const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
-        const float at = (position[k] - g->place.position[k]) / side + middle;
+        const float at = position[k] / side + middle;
         cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
     }
     return side;
@@ -202,7 +202,7 @@ static int tpc_choose_type(tpc_growth *g, const tpc_bud *bud) {
         tpc_is_shaded(g, bud) || bud->position[1] > g->ceiling)
         return TREEPIECES_TIP;
     /* a hanging axis ends before it reaches the ground */
-    if (bud->heading[1] < 0 && bud->position[1] - g->place.position[1] < tpc_clearance * g->trunk)
+    if (bud->heading[1] < 0 && bud->position[1] < tpc_clearance * g->trunk)
         return TREEPIECES_TIP;
     if (g->desc->rule == TREEPIECES_ALTERNATE) return bud->depth & 1 ? TREEPIECES_Y : TREEPIECES_I;
     if (g->desc->rule == TREEPIECES_RANDOM)
@@ -294,7 +294,7 @@ static void tpc_choose(tpc_growth *g, const tpc_bud *bud, treepieces_choice *c) 
 
 /* The first axes decide how high the tree is: others rise less and less under a dome as high, and end there. */
 static void tpc_limit_rise(const tpc_growth *g, tpc_bud *bud) {
-    const float x = bud->position[0] - g->place.position[0], z = bud->position[2] - g->place.position[2];
+    const float x = bud->position[0], z = bud->position[2];
     const float room = g->ceiling - bud->position[1] - tpc_dome * (x * x + z * z) / g->trunk;
     if (bud->heading[1] * 3 * bud->step <= room || bud->heading[1] <= 0) return;
     bud->heading[1] = txm_maxf(room / (3 * bud->step), 0);

@@ -31,7 +31,7 @@ static int tpc_most_joined(float stretch) {
 /* A piece as the grammar has it. */
 typedef struct tpc_segment {
     uint64_t seed;
-    float position[3], rotation[4]; /* of the piece, in the world                               */
+    float position[3], rotation[4]; /* of the piece, as of the rim in tpc_bud                   */
     float stem[3];                  /* its axis, unit length                                    */
     float radius, length, ratios[TREEPIECES_MAX_LEAVES]; /* metres; over radius                 */
     float part;                     /* of its length that bears the branches, a piece of its own */

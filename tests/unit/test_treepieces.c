@@ -235,6 +235,31 @@ static void test_seeds(void **state) {
     treepieces_forest_free(f);
 }
 
+/* A tree is the same wherever it stands, where floats are centimetres apart too, and however small. */
+static void test_far_away(void **state) {
+    (void)state;
+    treepieces_place places[4];
+    treepieces_forest_desc d = describe(4, 300);
+    memset(places, 0, sizeof places);
+    for (int i = 0; i < 4; i++) {
+        places[i].seed = 9;
+        places[i].scale = i < 2 ? 1 : 0.002f;
+        places[i].position[0] = i % 2 ? 9e5f : 0;
+        places[i].position[2] = i % 2 ? -3e5f : 0;
+    }
+    d.places = places;
+    treepieces_forest *f = grow(&d);
+    for (int i = 0; i < 4; i += 2) {
+        const treepieces_tree *here = &f->trees[i], *there = &f->trees[i + 1];
+        assert_int_equal(here->node_count, there->node_count);
+        assert_memory_equal(f->nodes + here->first_node, f->nodes + there->first_node,
+                            here->node_count * sizeof *f->nodes);
+        assert_float_equal(here->height, there->height, 0);
+        assert_true(here->height > (i ? 0.01f : 5));
+    }
+    treepieces_forest_free(f);
+}
+
 /* The places of a forest can be had without it, and make the same one. */
 static void test_scatter(void **state) {
     (void)state;
@@ -776,6 +801,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rims),      cmocka_unit_test(test_rims_in_wind),
         cmocka_unit_test(test_records),   cmocka_unit_test(test_bark_continues),
+        cmocka_unit_test(test_far_away),
         cmocka_unit_test(test_seeds),     cmocka_unit_test(test_budget),
         cmocka_unit_test(test_rules),     cmocka_unit_test(test_pruning),
         cmocka_unit_test(test_bones),     cmocka_unit_test(test_wind),

@@ -155,7 +155,7 @@ static inline void drain(pool *p) {
 /* A view of fresh bytes: rows may be padded, and lie bottom-up. */
 static inline txm_image fresh_image(pool *p, source *s, int width, int height, int channels,
                                     txm_sample sample) {
-    const size_t unit = txm_sample_bytes(sample), rows = (size_t)height;
+    const size_t unit = txm_sample_bytes(sample), rows = height > 1 ? (size_t)height : 1;
     const size_t row = (size_t)width * (size_t)channels * unit;
     const int form = pick(s, 8);
     const size_t stride = row + (form < 4 ? 0 : (size_t)(form - 3) * unit);
