@@ -1,6 +1,6 @@
 #!/bin/sh
 # Loaders of models and composites against hostile bytes, and public calls against pictures, masks,
-# meshes and options of all kinds: for each program as many runs as take some 20 s here, ten times as
+# meshes and options of all kinds: for each program as many runs as take some 10 s here, ten times as
 # many with FULL=1, from seed SEED. tests/wide/fuzz/fuzzkit.h tells more.
 . tests/kit/tap.sh
 
@@ -28,20 +28,20 @@ fuzz() {
         -I. -Itests/kit "tests/wide/fuzz/fuzz_$name.c" $with -o "$OUT/fuzz_$name" -lm &&
         check "$runs runs of fuzz_$name" "$OUT/fuzz_$name" $runs "$@"
 }
-fuzz texsyn_load 20000 "$tmp"/seeds/*
-fuzz texsyn_weather 150 "${SEED:-1}"
-fuzz texsyn_fill 150 "${SEED:-1}"
-fuzz texsyn_knit 150 "${SEED:-1}"
-fuzz texsyn_segment 60 "${SEED:-1}"
-fuzz texsyn_learn 100 "${SEED:-1}"
-fuzz texpatch 250 "${SEED:-1}"
-fuzz texedges 10000 "${SEED:-1}"
-fuzz textiles 600 "${SEED:-1}"
-fuzz texmath 20000 "${SEED:-1}"
-fuzz texinpaint 100 "${SEED:-1}"
-fuzz trimesh_relax 250 "${SEED:-1}"
-fuzz trimesh_cover 1000 "${SEED:-1}"
-fuzz treepieces 12000 "${SEED:-1}"
+fuzz texsyn_load 10000 "$tmp"/seeds/*
+fuzz texsyn_weather 75 "${SEED:-1}"
+fuzz texsyn_fill 75 "${SEED:-1}"
+fuzz texsyn_knit 75 "${SEED:-1}"
+fuzz texsyn_segment 30 "${SEED:-1}"
+fuzz texsyn_learn 50 "${SEED:-1}"
+fuzz texpatch 125 "${SEED:-1}"
+fuzz texedges 5000 "${SEED:-1}"
+fuzz textiles 300 "${SEED:-1}"
+fuzz texmath 10000 "${SEED:-1}"
+fuzz texinpaint 50 "${SEED:-1}"
+fuzz trimesh_relax 125 "${SEED:-1}"
+fuzz trimesh_cover 500 "${SEED:-1}"
+fuzz treepieces 6000 "${SEED:-1}"
 
 # libFuzzer follows what the loader does with its bytes
 if [ "$FULL" = 1 ] && has clang; then
