@@ -87,6 +87,22 @@ static inline void print_picture(const char *path, const txm_image *picture) {
            picture->channels);
 }
 
+/* The picture, continued by reflection to side x side pixels; for image_free(). */
+static inline txm_image resized(const txm_image *in, int side) {
+    txm_image out;
+    const size_t pixel = (size_t)in->channels * txm_sample_bytes(in->sample);
+    if (!image_new(side, side, in->channels, in->sample, &out)) give_up("picture", "no memory");
+    for (int y = 0; y < side; y++) {
+        const int v = y % (2 * in->height), row = v < in->height ? v : 2 * in->height - 1 - v;
+        for (int x = 0; x < side; x++) {
+            const int u = x % (2 * in->width), column = u < in->width ? u : 2 * in->width - 1 - u;
+            memcpy((uint8_t *)txm_image_row(&out, y) + (size_t)x * pixel,
+                   (const uint8_t *)txm_image_row_const(in, row) + (size_t)column * pixel, pixel);
+        }
+    }
+    return out;
+}
+
 enum { STAGES = 2 }; /* what --once times: at most so many stages */
 
 /* The tables of one benchmark. */

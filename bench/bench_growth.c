@@ -60,21 +60,6 @@ static void retile(trial *t) {
     free_surface(&s);
 }
 
-/* The picture, repeated by reflection to side x side pixels. */
-static txm_image resized(const trial *t, int side) {
-    const txm_image *in = t->picture, out = blank(t, side);
-    const size_t pixel = (size_t)in->channels;
-    for (int y = 0; y < side; y++) {
-        const int v = y % (2 * in->height), row = v < in->height ? v : 2 * in->height - 1 - v;
-        for (int x = 0; x < side; x++) {
-            const int u = x % (2 * in->width), column = u < in->width ? u : 2 * in->width - 1 - u;
-            memcpy((uint8_t *)txm_image_row(&out, y) + (size_t)x * pixel,
-                   (const uint8_t *)txm_image_row_const(in, row) + (size_t)column * pixel, pixel);
-        }
-    }
-    return out;
-}
-
 static texsyn_model *learn_from(const txm_image *example, int threads, result *r) {
     txm_env env = make_env(&threads);
     texsyn_learn_desc desc;
@@ -88,7 +73,7 @@ static texsyn_model *learn_from(const txm_image *example, int threads, result *r
 }
 
 static void learn(trial *t) {
-    txm_image example = resized(t, t->size);
+    txm_image example = resized(t->picture, t->size);
     texsyn_model_free(learn_from(&example, t->threads, &t->best));
     t->units = (double)t->size * t->size;
     image_free(&example);
@@ -182,7 +167,7 @@ static void forest(trial *t) {
 }
 
 static void write_png(trial *t) {
-    txm_image image = resized(t, t->size);
+    txm_image image = resized(t->picture, t->size);
     unsigned char *bytes;
     size_t size;
     const char *why;

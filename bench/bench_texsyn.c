@@ -52,28 +52,6 @@ static size_t model_bytes(const texsyn_model *model) {
     return size;
 }
 
-/* side x side pixels of the picture, mirrored at its borders where it is too small */
-static txm_image resized(const txm_image *in, int side) {
-    txm_image out = *in;
-    size_t c = (size_t)in->channels;
-    out.width = out.height = side;
-    uint8_t *to = (uint8_t *)malloc((size_t)side * (size_t)side * c);
-    if (!to) give_up("exemplar", "out of memory");
-    out.pixels = to;
-    for (int y = 0; y < side; y++) {
-        int v = y % (2 * in->height);
-        if (v >= in->height) v = 2 * in->height - 1 - v;
-        for (int x = 0; x < side; x++) {
-            int u = x % (2 * in->width);
-            if (u >= in->width) u = 2 * in->width - 1 - u;
-            size_t from = ((size_t)v * (size_t)in->width + (size_t)u) * c;
-            memcpy(to, (const uint8_t *)in->pixels + from, c);
-            to += c;
-        }
-    }
-    return out;
-}
-
 /* ---- the tables -------------------------------------------------------------------------- */
 
 static void line(const char *stage, int side, const result *one, const result *two, int bytes) {
@@ -103,7 +81,7 @@ static void sweep(const char *path, const txm_image *picture) {
             model = learn(exemplar, 2, &two);
         }
         line("learn", side, &one, &two, bytes);
-        free(exemplar.pixels);
+        image_free(&exemplar);
     }
     texsyn_model_free(model);
     result unused = no_result;

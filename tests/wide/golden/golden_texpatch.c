@@ -33,25 +33,24 @@ static uint64_t make(const texpatch_desc *desc, int channels, txm_env *env) {
     return tk_hash(0, out, (size_t)desc->width * (size_t)desc->height * (size_t)channels);
 }
 
-static uint64_t tileable(txm_env *env) {
-    golden_noise(exemplar[0], SIDE, SIDE, 3);
-    const txm_image map = golden_image(exemplar[0], SIDE, SIDE, 3, TXM_U8);
+static uint64_t torus(int channels, int width, int height, txm_env *env) {
+    golden_noise(exemplar[0], SIDE, SIDE, channels);
+    const txm_image map = golden_image(exemplar[0], SIDE, SIDE, channels, TXM_U8);
     const texpatch_exemplar e = one_exemplar(&map);
     texpatch_desc desc = describe(&e, 1, 1);
+    desc.width = width;
+    desc.height = height;
     desc.tileable = TEXPATCH_TILE_X | TEXPATCH_TILE_Y;
-    return make(&desc, 3, env);
+    return make(&desc, channels, env);
 }
 
-/* more rows than are finished at a time */
+static uint64_t tileable(txm_env *env) {
+    return torus(3, WIDTH, HEIGHT, env);
+}
+
+/* more rows than are finished at a time, and an odd number of them */
 static uint64_t tall(txm_env *env) {
-    golden_noise(exemplar[0], SIDE, SIDE, 1);
-    const txm_image map = golden_image(exemplar[0], SIDE, SIDE, 1, TXM_U8);
-    const texpatch_exemplar e = one_exemplar(&map);
-    texpatch_desc desc = describe(&e, 1, 1);
-    desc.width = 33;
-    desc.height = 601;
-    desc.tileable = TEXPATCH_TILE_X | TEXPATCH_TILE_Y;
-    return make(&desc, 1, env);
+    return torus(1, 33, 601, env);
 }
 
 static uint64_t turned(txm_env *env) {
