@@ -3633,7 +3633,7 @@ static void tpc_append_node(tpc_growth *g, const tpc_part *part, int32_t parent,
    second branch of a pair has grown. */
 static void tpc_reduce(const tpc_sketch *s, tpc_segment *t) {
     static const float half_turn[4] = {0, 1, 0, 0};
-    if (!tpc_is_elastic(s, t->type) || t->type != TREEPIECES_PLANAR || t->grown == 6) return;
+    if (s->is_rigid || t->type != TREEPIECES_PLANAR || t->grown == 6) return;
     t->type = TREEPIECES_SIDE;
     if (t->grown == 2) return;
     tpc_multiply(t->rotation, half_turn, t->rotation);
