@@ -517,7 +517,8 @@ TREEPIECES_API void treepieces_forest_free(treepieces_forest *forest);
 /* A pose: additional rotations of the joints. All zero is the tree as it grew. */
 typedef struct treepieces_pose {
     uint64_t seed;
-    float amount;        /* radians: each joint turns by up to this about a random axis across it */
+    float amount;        /* radians: each joint turns by up to this about a random axis across it,
+                            which depends on both seeds, this one and the tree's                  */
     const float *joints; /* NULL, or a unit quaternion per node, applied to it in addition        */
 } treepieces_pose;
 

@@ -19,14 +19,16 @@ static void tpc_bend(float q[4], float x, float z) {
     tpc_multiply(q, p, q);
 }
 
-/* Apply the pose to a joint: its random bend, which is a hash of the node, and its own rotation. */
-static void tpc_pose_joint(const treepieces_pose *pose, uint32_t node, float q[4]) {
+/* Apply the pose to joint i of a tree: its random bend, a hash of its number and of the tree's seed, and
+   its own rotation. */
+static void tpc_pose_joint(const treepieces_pose *pose, const treepieces_tree *t, uint32_t i, float q[4]) {
     if (pose->amount > 0) {
-        const uint64_t h = txm_hash(pose->seed ^ ((uint64_t)node + 1) * 0x9e3779b97f4a7c15u);
+        const uint64_t number = (uint64_t)t->seed << 32 | ((uint64_t)i + 1);
+        const uint64_t h = txm_hash(pose->seed ^ number * 0x9e3779b97f4a7c15u);
         const float u = (float)(h & 0xffffff) * 1.1920929e-7f - 1, v = (float)(h >> 40) * 1.1920929e-7f - 1;
         tpc_bend(q, 0.7f * pose->amount * u, 0.7f * pose->amount * v);
     }
-    if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)node, q);
+    if (pose->joints) tpc_multiply(q, pose->joints + 4 * (size_t)(t->first_node + i), q);
 }
 
 /* An angle as it is where it is small, and below 0.12 radians in any wind. */
@@ -84,7 +86,7 @@ static void tpc_pose_tree(void *context, int index) {
                 at[k] = ((a[4 * k] * to[0] + a[4 * k + 1] * to[1]) + a[4 * k + 2] * to[2]) + a[4 * k + 3];
             }
         }
-        if (p->pose) tpc_pose_joint(p->pose, number, q);
+        if (p->pose) tpc_pose_joint(p->pose, t, i, q);
         if (p->air) {
             const float *d = p->air->direction;
             const float wind[3] = {pressure * (r[0] * d[0] + r[6] * d[2]),

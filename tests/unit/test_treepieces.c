@@ -435,6 +435,40 @@ static void test_bones(void **state) {
     treepieces_forest_free(f);
 }
 
+/* A tree is bent in the same way whatever other trees are in the forest, and differently from others. */
+static void test_pose_alone(void **state) {
+    (void)state;
+    treepieces_place places[3] = {{{0, 0, 0}, 0, 1, 0, 7}, {{9, 0, 0}, 1, 1, 0, 8}, {{0, 0, 0}, 0, 1, 0, 9}};
+    treepieces_forest_desc d = describe(3, 200);
+    d.places = places;
+    grown all = grow_posed(&d, 0.3f, 4);
+    for (int i = 0; i < 3; i++) {
+        const treepieces_tree *t = &all.forest->trees[i];
+        const float *own = all.bones + TREEPIECES_BONE * (size_t)t->first_node;
+        d.places = &places[i];
+        d.tree_count = 1;
+        grown one = grow_posed(&d, 0.3f, 4);
+        assert_int_equal(one.forest->node_count, t->node_count);
+        assert_memory_equal(one.bones, own, t->node_count * TREEPIECES_BONE * sizeof(float));
+        free_grown(&one);
+    }
+    free_grown(&all);
+
+    /* the same shape with another seed of the tree: another bend of its lowest joint */
+    places[1] = places[0];
+    d.places = places;
+    d.tree_count = 2;
+    grown two = grow_posed(&d, 0.3f, 4);
+    const float *second = two.bones + TREEPIECES_BONE * (size_t)two.forest->trees[1].first_node;
+    assert_memory_equal(two.bones, second, TREEPIECES_BONE * sizeof(float));
+    free_grown(&two);
+    places[1].seed++;
+    two = grow_posed(&d, 0.3f, 4);
+    second = two.bones + TREEPIECES_BONE * (size_t)two.forest->trees[1].first_node;
+    assert_true(memcmp(two.bones, second, TREEPIECES_BONE * sizeof(float)) != 0);
+    free_grown(&two);
+}
+
 static float farthest(const float *a, const float *b, uint32_t nodes) {
     float most = 0;
     for (uint32_t i = 0; i < nodes; i++)
@@ -804,7 +838,8 @@ int main(void) {
         cmocka_unit_test(test_far_away),
         cmocka_unit_test(test_seeds),     cmocka_unit_test(test_budget),
         cmocka_unit_test(test_rules),     cmocka_unit_test(test_pruning),
-        cmocka_unit_test(test_bones),     cmocka_unit_test(test_wind),
+        cmocka_unit_test(test_bones),     cmocka_unit_test(test_pose_alone),
+        cmocka_unit_test(test_wind),
         cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
         cmocka_unit_test(test_arguments), cmocka_unit_test(test_faults),
         cmocka_unit_test(test_memory),    cmocka_unit_test(test_scatter),
