@@ -10,6 +10,7 @@
 #define CLI_H
 
 #include "env.h"
+#include "extent.h"
 
 #define TEXKIT_VERSION "0.2.0"
 
@@ -89,7 +90,7 @@ typedef struct cli {
         double values[CLI_MAX_LIST];
         int count; /* 0: a single number; else a list of so many */
     } figures[CLI_MAX_FIGURES];
-    int stage_count, figure_count, bar_is_on;
+    int stage_count, stage, figure_count, bar_is_on; /* stage: the number of the present one */
     env_memory memory;
 } cli;
 
@@ -113,7 +114,7 @@ void cli_warn(cli *run, const char *format, ...)
 #endif
     ;
 
-/* Time from here on counts for this stage (a string literal). */
+/* Time from here on counts for this stage (a string literal), which may have been one before. */
 void cli_stage(cli *run, const char *name);
 
 /* A figure of the result for --stats (name: a string literal). */
@@ -157,6 +158,8 @@ typedef struct cli_file {
     const char *name; /* its path; for cli_finish_folder, its name in the output folder */
     const void *bytes;
     size_t size;
+    const file_extent *extents; /* instead of bytes: NULL, or extent_count of them, size bytes in all */
+    int extent_count;
 } cli_file;
 int cli_finish_files(cli *run, const cli_file *files, int count);
 

@@ -4,6 +4,9 @@
 #include "env.h"
 
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #ifdef _OPENMP
 #include <omp.h>
 #endif
@@ -80,4 +83,11 @@ void env_let_threads_sleep(char **argv) {
         execv("/proc/self/exe", argv);
 #endif
     (void)argv;
+}
+
+void env_keep_memory(void) {
+#ifdef __GLIBC__
+    mallopt(M_MMAP_THRESHOLD, 64 << 20); /* larger blocks still are on their own */
+    mallopt(M_TRIM_THRESHOLD, 256 << 20);
+#endif
 }

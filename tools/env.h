@@ -21,4 +21,9 @@ int env_cores(void);
    main begins. Returns when they do so already, or where the program cannot be started again. */
 void env_let_threads_sleep(char **argv);
 
+/* Work that allocates the same amounts again and again: what is released, up to a quarter of a gigabyte, stays
+   with the program, as fresh memory takes longer to come by than many a thing takes to compute. Does
+   nothing where the C library cannot. */
+void env_keep_memory(void);
+
 #endif /* ENV_H */

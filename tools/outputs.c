@@ -211,8 +211,9 @@ int cli_announce(cli *run, const cli_option *own, const cli_option *common) {
 
 typedef struct output {
     const char *path;
-    const void *bytes;
-    size_t size;
+    file_extent whole;
+    const file_extent *extents; /* &whole, or others */
+    int extent_count;
     int is_stdout;
     place place;
     char temporary[PLACE_TEMPORARY]; /* the name of a file in that folder, or empty */
@@ -232,9 +233,9 @@ void cli_remove_unfinished(void) {
     if (new_folder[0]) rmdir(new_folder);
 }
 
-static int write_bytes(int file, const output *o) {
-    for (size_t done = 0; done < o->size;) {
-        const ssize_t n = write(file, (const char *)o->bytes + done, o->size - done);
+static int write_extent(int file, const file_extent *e) {
+    for (size_t done = 0; done < e->size;) {
+        const ssize_t n = write(file, (const char *)e->bytes + done, e->size - done);
         if (n < 0 && errno == EINTR) continue;
         if (n == 0) errno = EIO;
         if (n <= 0) return 0;
@@ -243,9 +244,15 @@ static int write_bytes(int file, const output *o) {
     return 1;
 }
 
+static int write_extents(int file, const output *o) {
+    int ok = 1;
+    for (int i = 0; i < o->extent_count && ok; i++) ok = write_extent(file, &o->extents[i]);
+    return ok;
+}
+
 static int write_and_close(int file, const output *o, int keep_mode) {
     if (file < 0) return 0;
-    int error = write_bytes(file, o) && (!keep_mode || place_keep_mode(&o->place, file)) ? 0 : errno;
+    int error = write_extents(file, o) && (!keep_mode || place_keep_mode(&o->place, file)) ? 0 : errno;
     if (close(file) != 0 && !error) error = errno;
     errno = error;
     return error == 0;
@@ -334,14 +341,21 @@ static int write_outputs(output *outputs, int count) {
     return failed;
 }
 
+/* The bytes of an output are in one block. */
+static void set_bytes(output *o, const void *bytes, size_t size) {
+    o->whole.bytes = bytes;
+    o->whole.size = size;
+    o->extents = &o->whole;
+    o->extent_count = 1;
+}
+
 /* Write all outputs and the statistics, or none. outputs must have room for one more. */
 static int finish(cli *run, output *outputs, int count) {
     char text[8192];
     const size_t size = cli_end(run, text, sizeof text);
     if (run->stats) {
         outputs[count].path = run->stats;
-        outputs[count].bytes = text;
-        outputs[count++].size = size;
+        set_bytes(&outputs[count++], text, size);
     }
     for (int i = 0; i < count; i++) {
         outputs[i].place.folder = -1;
@@ -365,8 +379,7 @@ static int finish(cli *run, output *outputs, int count) {
 int cli_finish(cli *run, const void *bytes, size_t size) {
     output outputs[2] = {{0}, {0}};
     outputs[0].path = run->output;
-    outputs[0].bytes = bytes;
-    outputs[0].size = size;
+    set_bytes(&outputs[0], bytes, size);
     return finish(run, outputs, 1);
 }
 
@@ -375,8 +388,10 @@ int cli_finish_files(cli *run, const cli_file *files, int count) {
     if (!outputs) return cli_fail(run, CLI_FAILED, "out of memory");
     for (int i = 0; i < count; i++) {
         outputs[i].path = files[i].name;
-        outputs[i].bytes = files[i].bytes;
-        outputs[i].size = files[i].size;
+        set_bytes(&outputs[i], files[i].bytes, files[i].size);
+        if (!files[i].extents) continue;
+        outputs[i].extents = files[i].extents;
+        outputs[i].extent_count = files[i].extent_count;
     }
     const int status = finish(run, outputs, count);
     free(outputs);

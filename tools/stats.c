@@ -19,9 +19,13 @@ double cli_seconds(const cli *run) {
 
 void cli_stage(cli *run, const char *name) {
     double t = cli_now();
-    if (run->stage_count) run->stages[run->stage_count - 1].seconds = t - run->stage_started;
+    if (run->stage_count) run->stages[run->stage].seconds += t - run->stage_started;
     run->stage_started = t;
-    if (name && run->stage_count < CLI_MAX_STAGES) run->stages[run->stage_count++].name = name;
+    if (!name) return;
+    for (run->stage = 0; run->stage < run->stage_count; run->stage++)
+        if (!strcmp(run->stages[run->stage].name, name)) return;
+    assert(run->stage_count < CLI_MAX_STAGES);
+    run->stages[run->stage_count++].name = name;
 }
 
 void cli_figure(cli *run, const char *name, double value) {

@@ -172,6 +172,11 @@ check "and without leaves" $check_tree forest laid.glb clouds=0 images=2
 check "baked" run 0 forest --count 3 -o grove.obj --species oak,birch --pieces 120 --spacing 8
 check "is a tree each" $check_tree obj grove.obj components=3 rims=3
 check "as PLY" run 0 forest --count 3 -o grove.ply --species oak,birch --pieces 50
+parts="forest --count 20 --species dead,dead --pose 0.1 --sheet 128"
+check "all trees at once" run 0 $parts --pieces 40000 -o once.glb --stats stats.json
+pieces=$(figure pieces)
+check "or tree by tree" run 0 $parts --pieces 65535 -o parts.glb --threads 2 --stats stats.json
+check "are the same forest" sh -c "cmp once.glb parts.glb && test $pieces = $(figure pieces)"
 check "a thousand trees" "$released" forest --count 1000 -o many.glb --pieces 150 --quiet
 check "are no more nodes" $check_tree forest many.glb most_nodes=10 trees=1000 expect=many.json
 keep many.glb many.json

@@ -490,6 +490,26 @@ static void encode(const char *extension, const mesh_scene *scene, unsigned char
     if (!mesh_encode(extension, scene, out, size, &why)) fail_msg("%s", why);
 }
 
+/* The file in extents has the same bytes, and so many of these are in the arrays of the scene. */
+static void assert_same_extents(const mesh_scene *scene, const char *extension, const unsigned char *bytes,
+                                size_t size, const void *array, int lent) {
+    mesh_file file;
+    const char *why;
+    size_t at = 0;
+    int found = 0;
+    assert_true(mesh_encode_extents(extension, scene, &file, &why));
+    assert_int_equal(file.size, size);
+    for (int i = 0; i < file.count; i++) {
+        assert_true(file.extents[i].size > 0 && file.extents[i].size <= size - at);
+        assert_memory_equal(file.extents[i].bytes, bytes + at, file.extents[i].size);
+        at += file.extents[i].size;
+        found += file.extents[i].bytes == array;
+    }
+    assert_int_equal(at, size);
+    assert_int_equal(found, lent);
+    mesh_file_free(&file);
+}
+
 /* Corner by corner, as vertices may have been doubled. */
 static void assert_same_corners(const mesh_data *a, const mesh_data *b) {
     assert_int_equal(a->triangle_count, b->triangle_count);
@@ -574,6 +594,12 @@ static void glb_is_made_of_whole_chunks(void **state) {
     assert_int_equal(u32_at(out + 20 + length) % 4, 0);
     assert_memory_equal(out + 24 + length, "BIN\0", 4);
     assert_int_equal(28 + length + u32_at(out + 20 + length), size);
+    assert_same_extents(&scene, ".glb", out, size, translations, 1);
+    free(out);
+    scene.instances = NULL;
+    scene.instance_count = 0;
+    encode(".obj", &scene, &out, &size);
+    assert_same_extents(&scene, ".obj", out, size, translations, 0);
     free(out);
 }
 

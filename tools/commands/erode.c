@@ -113,7 +113,7 @@ static int write_outputs(erode_job *j) {
     cli *run = &j->run;
     const char *const names[3] = {run->output, j->cracks, j->intact};
     const txm_image *const pictures[3] = {&j->out, &j->cracks_out, &j->intact_out};
-    cli_file files[3];
+    cli_file files[3] = {{0}};
     unsigned char *bytes[3] = {NULL, NULL, NULL};
     size_t total = 0;
     int count = 0;

@@ -122,7 +122,7 @@ static int read_pictures(straighten_job *j) {
 }
 
 static int write_pictures(straighten_job *j) {
-    cli_file files[1 + MAX_STRAIGHT_MAPS];
+    cli_file files[1 + MAX_STRAIGHT_MAPS] = {{0}};
     unsigned char *bytes[1 + MAX_STRAIGHT_MAPS] = {NULL};
     int status = CLI_DONE;
     cli_stage(&j->run, "encode");

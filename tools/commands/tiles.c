@@ -156,7 +156,7 @@ static int write_set(cli *run, const textiles_set *set, const textiles_layout *l
                      const txm_sample *samples) {
     const int maps = textiles_map_count(set);
     txm_image atlas[TEXTILES_MAX_MAPS], preview = {0};
-    cli_file files[TEXTILES_MAX_MAPS + 1 + DOCUMENTS];
+    cli_file files[TEXTILES_MAX_MAPS + 1 + DOCUMENTS] = {{0}};
     char names[TEXTILES_MAX_MAPS + 1][24];
     unsigned char *bytes[TEXTILES_MAX_MAPS + 1] = {NULL};
     char *texts[DOCUMENTS] = {NULL};

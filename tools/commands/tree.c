@@ -1,8 +1,8 @@
 /* tree.c - texkit tree and texkit forest: a species in, trees out
    SPDX-License-Identifier: MIT OR Unlicense
 
-   run_job and grow_trees at the end show the steps: read the species, grow, pose, dress (bark,
-   leaves), build, write. What is built is a baked mesh, a mesh with a skeleton, or instances.    */
+   run_job and grow_trees at the end show the steps: read the species, dress (bark, leaves),
+   grow, pose, build, write. What is built is a baked mesh, a mesh with a skeleton, or instances.    */
 #include "tree.h"
 #include "files/image_io.h"
 
@@ -237,6 +237,7 @@ static int build_rigged(tree_job *j, built *b) {
 
 static int build_copies(tree_job *j, const float tint[3], built *b) {
     const int status = tree_make_copies(j, tint, &b->copies);
+    cli_stage(&j->run, "build");
     b->scene.instances = b->copies.list;
     b->scene.instance_count = b->copies.count;
     cli_figure(&j->run, "nodes", b->copies.count);
@@ -287,7 +288,6 @@ static int build_variants(tree_job *j, built *b) {
 
 /* The extras of a .glb: species, seed, numbers of trees and pieces. */
 static int make_extras(tree_job *j, built *b) {
-    const treepieces_forest *f = j->forest;
     char seed[24];
     cJSON *json = cJSON_CreateObject();
     cJSON *names = cJSON_AddArrayToObject(json, "species");
@@ -297,7 +297,7 @@ static int make_extras(tree_job *j, built *b) {
     cJSON_AddRawToObject(json, "seed", seed); /* a double cannot hold all of them */
     cJSON_AddNumberToObject(json, "trees", j->count);
     if (j->variants) cJSON_AddNumberToObject(json, "variants", j->variants);
-    cJSON_AddNumberToObject(json, "pieces", f->node_count);
+    cJSON_AddNumberToObject(json, "pieces", (double)j->grown.pieces);
     b->extras = cJSON_PrintUnformatted(json);
     cJSON_Delete(json);
     b->scene.extras = b->extras;
@@ -331,7 +331,8 @@ static size_t count_vertices(const built *b) {
 static int write_output(tree_job *j, built *b) {
     cli *run = &j->run;
     cli_file files[2 + 2 * MAX_SPECIES + MAX_LEVELS]; /* OUT, .mtl, pictures, levels */
-    unsigned char *bytes = NULL, *mtl = NULL;
+    unsigned char *mtl = NULL;
+    mesh_file out;
     const char *why;
     int status = CLI_DONE, count = 1;
     const int is_obj = !strcmp(j->extension, ".obj");
@@ -339,10 +340,12 @@ static int write_output(tree_job *j, built *b) {
 
     b->scene.parts = b->parts;
     if (is_obj) b->scene.library = name_in(j->mtl_path);
-    if (!mesh_encode(j->extension, &b->scene, &bytes, &files[0].size, &why))
+    if (!mesh_encode_extents(j->extension, &b->scene, &out, &why))
         status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", run->output, why);
     files[0].name = run->output;
-    files[0].bytes = bytes;
+    files[0].extents = out.extents;
+    files[0].extent_count = out.count;
+    files[0].size = out.size;
     if (!status && is_obj) {
         if (!mesh_encode_mtl(&b->scene, &mtl, &files[1].size, &why))
             status = cli_fail(run, CLI_FAILED, "cannot write '%s': %s", j->mtl_path, why);
@@ -365,18 +368,17 @@ static int write_output(tree_job *j, built *b) {
     }
     cli_figure(run, "file_bytes", (double)files[0].size);
     if (!status) status = cli_finish_files(run, files, count);
-    free(bytes);
+    mesh_file_free(&out);
     free(mtl);
     return status;
 }
 
 static void print_summary(const tree_job *j, const built *b, size_t triangles) {
-    const treepieces_forest *f = j->forest;
     printf("%s: ", j->run.output);
     if (j->is_forest) printf("%d trees, ", j->count);
-    else printf("%s, %.1f m high, ", j->species[0].name, (double)f->trees[0].height);
+    else printf("%s, %.1f m high, ", j->species[0].name, (double)j->grown.height);
     if (j->variants) printf("%d different ones, ", b->scene.object_count);
-    printf("%lu pieces, %lu triangles", (unsigned long)f->node_count, (unsigned long)triangles);
+    printf("%lu pieces, %lu triangles", (unsigned long)j->grown.pieces, (unsigned long)triangles);
     if (b->scene.skeleton) printf(", %d joints", b->rig.skeleton.joint_count);
     if (b->rig.skeleton.key_count) printf(", %d keys", b->rig.skeleton.key_count);
     if (b->scene.instance_count) printf(" in %d nodes", b->scene.instance_count);
@@ -446,25 +448,20 @@ static int make_collision(tree_job *j) {
     return status;
 }
 
-/* Grow, pose, dress and write. */
+/* Dress, grow, pose and write. */
 static int grow_trees(tree_job *j, built *b) {
+    const int is_copied = tree_is_copied(j); /* grows as its copies are made */
     float tint[3];
-    int status = CLI_DONE;
-    if (j->lods > 1) {
-        cli_stage(&j->run, "dress");
-        status = tree_dress(j, tint);
-    }
+    cli_stage(&j->run, "dress");
+    int status = tree_dress(j, tint);
     for (int i = j->lods - 1; i > 0 && !status; i--) status = make_level(j, i);
     if (j->collision && !status) status = make_collision(j);
-    if (!status) status = tree_grow(j);
-    if (status) return status;
-    cli_stage(&j->run, "dress");
-    if (j->lods < 2) status = tree_dress(j, tint);
+    if (!status && !is_copied) status = tree_grow(j);
     if (status) return status;
     cli_stage(&j->run, "build");
     if (j->variants) status = build_variants(j, b);
     else if (!tree_is_glb(j) || j->wind_attributes) status = build_baked(j, b);
-    else status = j->is_forest ? build_copies(j, tint, b) : build_rigged(j, b);
+    else status = is_copied ? build_copies(j, tint, b) : build_rigged(j, b);
     if (!status) status = make_extras(j, b);
     if (status) return status;
     const size_t triangles = count_triangles(b);

@@ -46,8 +46,12 @@ typedef struct tree_job {
     treepieces_species species[MAX_SPECIES];
     int species_count;
     treepieces_kit *kit;
-    treepieces_forest *forest;
+    treepieces_forest *forest; /* or a part of it */
     float *rest, *posed; /* bones; posed: by --pose and, if baked, by --wind */
+    struct {
+        size_t pieces, clusters, bytes;
+        float height; /* of the highest tree */
+    } grown;          /* of all trees, though not all may be in memory */
 
     char mtl_path[MAX_PATH]; /* beside an .obj */
 
@@ -75,6 +79,9 @@ int tree_is_glb(const tree_job *j);
 /* Does the file hold no pictures, as .ply and .stl? */
 int tree_is_bare(const tree_job *j);
 
+/* Is it a forest of instances? */
+int tree_is_copied(const tree_job *j);
+
 /* Read all species of --species. */
 int tree_read_species(tree_job *j);
 
@@ -84,6 +91,16 @@ treepieces_forest_desc tree_forest_desc(const tree_job *j);
 /* Grow the trees and compute their bones. With --variants these alone grow, at the origin: number k is
    of species k mod species_count, and the tree of seed --seed + k. */
 int tree_grow(tree_job *j);
+
+/* The pieces, if there are none yet. */
+int tree_make_kit(tree_job *j);
+
+/* Grow these trees in place of those that there are; each is the same whatever the others are. */
+int tree_grow_places(tree_job *j, const treepieces_place *places, int count);
+
+/* What a job has grown, for --stats; and the trees that there are are part of it. */
+void tree_report(tree_job *j);
+void tree_count(tree_job *j);
 
 /* Let go of the trees, to grow them again with fewer pieces. */
 void tree_fell(tree_job *j);
@@ -131,17 +148,25 @@ int tree_add_pivots(tree_job *j, int tree, const treepieces_mesh *from, mesh_dat
 
 /* ---- tree_copies.c ---- */
 
+/* Where the copies of a mesh are, a list that grows. */
+typedef struct copy_list {
+    float *translations, *rotations, *scales; /* as in mesh_instances */
+    unsigned char *colors;
+    size_t count, capacity;
+} copy_list;
+
 /* A forest as instances of pieces and leaf clouds. */
+enum { MAX_COPIED = TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS };
 typedef struct tree_copies {
-    mesh_instances list[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS];
-    mesh_data meshes[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS];
-    char names[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS][40];
-    float *blocks[TREEPIECES_MAX_TYPES + MAX_SPECIES + CLOUDS]; /* translations and so on */
-    unsigned char *colors[TREEPIECES_MAX_TYPES];
-    int count;
+    copy_list lists[MAX_COPIED]; /* by type of the piece; then by species or cloud */
+    mesh_instances list[MAX_COPIED];
+    mesh_data meshes[MAX_COPIED];
+    char names[MAX_COPIED][40];
+    int count; /* of those with copies, in list, meshes and names */
 } tree_copies;
 
-/* tint: sRGB 0..1, the color that the bark's picture was drawn with */
+/* Grow the forest, some trees at a time, and keep of it where its pieces and leaf clouds are.
+   tint: sRGB 0..1, the color that the bark's picture was drawn with */
 int tree_make_copies(tree_job *j, const float tint[3], tree_copies *copies);
 void tree_free_copies(tree_copies *copies);
 

@@ -4,14 +4,50 @@
    An instance is placed by translation, rotation and scale, so pieces are rigid: all of one type
    have the mean shape, and where a branch bends more or less than the mean, the rims of adjacent
    pieces do not meet. Every piece therefore begins a little before its root rim, inside the piece
-   below.                                                                                         */
+   below.
+
+   A large forest grows part by part, and only where its copies are is kept: 40 bytes of a piece, a third
+   of what grown trees and their bones take, which the next part takes over. Which instances the mean is
+   of depends on how many there are in all; the trees that have them then grow once more.         */
 #include "tree.h"
 
 #include <stdio.h>
 
-enum { SAMPLED = 200 }; /* instances for the mean shape, at most */
+enum {
+    SAMPLED = 200,          /* instances for the mean shape, at most                              */
+    WHOLE_PIECES = 1 << 20, /* a forest that cannot have more pieces grows at once ...            */
+    PART_PIECES = 1 << 16,  /* ... others so many at a time, at most                              */
+    RUN = 4096,             /* copies that a thread places at a time                              */
+    RECORD = 4 + (TREEPIECES_MAX_QUADS + 3) / 4 /* words, at most */
+};
 static const float SLEEVE_DEPTH = 0.08f; /* of the piece's length */
 static const float SLEEVE_RADIUS = 0.94f;
+
+/* Sums over instances of a type of piece, in its own frame. */
+typedef struct piece_shape {
+    double place[3 * TREEPIECES_MAX_VERTICES], normal[3 * TREEPIECES_MAX_VERTICES], weights;
+    uint32_t record[RECORD]; /* of the instance whose tiles all of them show */
+} piece_shape;
+
+/* A forest that grows part by part. */
+typedef struct gathering {
+    tree_job *j;
+    tree_copies *copies;
+    treepieces_place *places; /* of all trees                                                     */
+    int part;                 /* trees that grow at a time, at most                               */
+    int types;                /* of pieces                                                        */
+    uint16_t *counts;         /* by tree and type: its pieces                                     */
+    int *sampled;             /* numbers of the trees that grow once more                         */
+    piece_shape *shapes;      /* by type                                                          */
+    int has_colors;
+    unsigned char factors[MAX_SPECIES][4]; /* from the picture's color to the species' bark       */
+    unsigned char *species;                /* by node of the part, if copies have colors          */
+    int type;                              /* of the pieces that are being placed                 */
+    size_t first;                          /* where the part begins in their list                 */
+    float from, share;                     /* of the progress of all parts                        */
+    int (*progress)(void *user, float fraction, const char *stage);
+    void *progress_user;
+} gathering;
 
 static const float *bone_of(const tree_job *j, uint32_t node) {
     return j->posed + TREEPIECES_BONE * (size_t)node;
@@ -31,38 +67,58 @@ static int new_mesh(tree_job *j, size_t vertices, size_t triangles, mesh_data *m
     return m->positions && m->normals && m->indices && m->uvs ? CLI_DONE : fail_memory(&j->run);
 }
 
-/* The next entry, with room for so many copies. */
-static mesh_instances *new_copies(tree_job *j, tree_copies *copies, size_t count,
-                                  const mesh_material *material, const char *name) {
-    const int i = copies->count;
-    mesh_instances *t = &copies->list[i];
-    float *block = (float *)new_array(count, 10 * sizeof(float));
-    if (!block) {
-        fail_memory(&j->run);
-        return NULL;
-    }
-    copies->blocks[i] = block;
-    copies->count++;
-    snprintf(copies->names[i], sizeof copies->names[i], "%.39s", name);
-    t->mesh = &copies->meshes[i];
-    t->count = count;
-    t->translations = block;
-    t->rotations = block + 3 * count;
-    t->scales = block + 7 * count;
-    t->material = material;
-    t->name = copies->names[i];
-    return t;
+/* ---- lists of copies ----------------------------------------------------------------------- */
+
+static void *resize(void *block, size_t count, size_t size) {
+    size_t bytes;
+    return txm_mul(count, size, 1, &bytes) ? realloc(block, bytes ? bytes : 1) : NULL;
 }
 
-static void place_copy(const mesh_instances *t, size_t i, const float place[3], txm_quat q,
-                       float across, float along) {
+/* Make room for so many more copies. Memory is asked for as all trees may need, judged by those that are
+   done: what is never used of it takes none. */
+static int reserve(const gathering *g, copy_list *list, size_t more, int done, int has_colors) {
+    const size_t count = list->count + more;
+    const double all = 1.05 * (double)count / done * g->j->count + 64;
+    void *block;
+    if (count <= list->capacity) return CLI_DONE;
+    const size_t room = all < 1e9 && all > (double)count ? (size_t)all : count;
+    if (!(block = resize(list->translations, room, 3 * sizeof(float)))) return fail_memory(&g->j->run);
+    list->translations = (float *)block;
+    if (!(block = resize(list->rotations, room, 4 * sizeof(float)))) return fail_memory(&g->j->run);
+    list->rotations = (float *)block;
+    if (!(block = resize(list->scales, room, 3 * sizeof(float)))) return fail_memory(&g->j->run);
+    list->scales = (float *)block;
+    if (has_colors && !(block = resize(list->colors, room, 4))) return fail_memory(&g->j->run);
+    if (has_colors) list->colors = (unsigned char *)block;
+    list->capacity = room;
+    return CLI_DONE;
+}
+
+static void place_copy(const copy_list *t, size_t i, const float place[3], txm_quat q, float across,
+                       float along) {
     const double rotation[4] = {q.x, q.y, q.z, q.w};
-    float *block = (float *)t->translations; /* ours, see new_copies */
-    memcpy(block + 3 * i, place, 3 * sizeof(float));
-    for (size_t k = 0; k < 4; k++) block[3 * t->count + 4 * i + k] = (float)rotation[k];
-    block[7 * t->count + 3 * i] = across;
-    block[7 * t->count + 3 * i + 1] = along;
-    block[7 * t->count + 3 * i + 2] = across;
+    memcpy(t->translations + 3 * i, place, 3 * sizeof(float));
+    for (size_t k = 0; k < 4; k++) t->rotations[4 * i + k] = (float)rotation[k];
+    t->scales[3 * i] = across;
+    t->scales[3 * i + 1] = along;
+    t->scales[3 * i + 2] = across;
+}
+
+/* A list becomes instances of the next mesh. */
+static mesh_data *add_instances(tree_copies *copies, const copy_list *list, const mesh_material *material,
+                                const char *name) {
+    const int i = copies->count++;
+    mesh_instances *t = &copies->list[i];
+    snprintf(copies->names[i], sizeof copies->names[i], "%.39s", name);
+    t->mesh = &copies->meshes[i];
+    t->count = list->count;
+    t->translations = list->translations;
+    t->rotations = list->rotations;
+    t->scales = list->scales;
+    t->colors = list->colors;
+    t->material = material;
+    t->name = copies->names[i];
+    return &copies->meshes[i];
 }
 
 /* ---- pieces -------------------------------------------------------------------------------- */
@@ -74,53 +130,51 @@ static void put_corner(mesh_data *m, size_t *corner, uint32_t vertex, const floa
     ++*corner;
 }
 
-/* The mean shape of a type of piece in its own frame, weighted by thickness. It includes the mean
-   direction of its branches, so that their rims fit approximately. */
-static void mean_shape(const tree_job *j, int type, int vertices, mesh_data *m) {
+/* Add an instance of the part to the sums, weighted by thickness. They include the mean direction of its
+   branches, so that their rims fit approximately. */
+static void add_shape(const tree_job *j, int type, uint32_t instance, piece_shape *shape) {
     const treepieces_batch *b = &j->forest->batches[type];
-    const uint32_t step = b->count / SAMPLED + 1;
+    const int vertices = treepieces_kit_piece(j->kit, type)->vertex_count;
+    const float *bone = bone_of(j, b->words[(size_t)instance * b->stride]);
+    const double weight = (double)column_length(bone, 0);
     float positions[3 * TREEPIECES_MAX_VERTICES], normals[3 * TREEPIECES_MAX_VERTICES];
-    double place[3 * TREEPIECES_MAX_VERTICES] = {0}, normal[3 * TREEPIECES_MAX_VERTICES] = {0};
-    double weights = 0;
-    for (uint32_t i = 0; i < b->count; i += step) {
-        const float *bone = bone_of(j, b->words[(size_t)i * b->stride]);
-        const double weight = (double)column_length(bone, 0);
-        treepieces_skin(j->forest, j->posed, type, i, positions, normals);
-        for (int v = 0; v < 3 * vertices; v++) {
-            const int first = v - v % 3, c = v % 3; /* along column c of the bone */
-            double square = 0, along = 0, facing = 0;
-            for (int r = 0; r < 3; r++) {
-                const double axis = (double)bone[4 * r + c];
-                square += axis * axis;
-                along += axis * ((double)positions[first + r] - (double)bone[4 * r + 3]);
-                facing += axis * (double)normals[first + r];
-            }
-            place[v] += weight * along / square;
-            normal[v] += facing; /* weighted by the size of the piece */
+    treepieces_skin(j->forest, j->posed, type, instance, positions, normals);
+    for (int v = 0; v < 3 * vertices; v++) {
+        const int first = v - v % 3, c = v % 3; /* along column c of the bone */
+        double square = 0, along = 0, facing = 0;
+        for (int r = 0; r < 3; r++) {
+            const double axis = (double)bone[4 * r + c];
+            square += axis * axis;
+            along += axis * ((double)positions[first + r] - (double)bone[4 * r + 3]);
+            facing += axis * (double)normals[first + r];
         }
-        weights += weight;
+        shape->place[v] += weight * along / square;
+        shape->normal[v] += facing; /* weighted by the size of the piece */
     }
+    shape->weights += weight;
+}
+
+/* The mean shape. */
+static void finish_shape(const piece_shape *shape, int vertices, mesh_data *m) {
     for (int v = 0; v < vertices; v++) {
-        double *n = normal + 3 * v;
+        const double *n = shape->normal + 3 * v;
         const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (int c = 0; c < 3; c++) {
-            m->positions[3 * v + c] = (float)(place[3 * v + c] / weights);
+            m->positions[3 * v + c] = (float)(shape->place[3 * v + c] / shape->weights);
             m->normals[3 * v + c] = length > 0 ? (float)(n[c] / length) : (float)(c == 1);
         }
     }
 }
 
 /* A type of piece with the tiles of one of its instances, and the sleeve below its root rim. */
-static int make_piece(tree_job *j, int type, mesh_data *m) {
+static int make_piece(tree_job *j, int type, const piece_shape *shape, mesh_data *m) {
     static const int order[6] = {0, 1, 2, 0, 2, 3};
     const treepieces_piece *p = treepieces_kit_piece(j->kit, type);
-    const treepieces_batch *b = &j->forest->batches[type];
-    const uint32_t *record = b->words + (size_t)(b->count / 2) * b->stride;
     const uint32_t n = (uint32_t)p->vertex_count, rim = TREEPIECES_RIM;
     const int status = new_mesh(j, n + rim, 2 * ((size_t)p->quad_count + rim), m);
     size_t corner = 0;
     if (status) return status;
-    mean_shape(j, type, p->vertex_count, m);
+    finish_shape(shape, p->vertex_count, m);
     for (uint32_t i = 0; i < rim; i++) {
         const uint32_t from = 3 * (uint32_t)p->root_rim[i], to = 3 * (n + i);
         m->positions[to] = SLEEVE_RADIUS * m->positions[from];
@@ -130,10 +184,10 @@ static int make_piece(tree_job *j, int type, mesh_data *m) {
     }
     for (int i = 0; i < p->quad_count; i++) {
         const treepieces_quad *q = &p->quads[i];
-        const int cell = (int)(record[4 + i / 4] >> 8 * (i % 4) & 255);
+        const int cell = (int)(shape->record[4 + i / 4] >> 8 * (i % 4) & 255);
         float uv[4][2];
         for (int k = 0; k < 4; k++) {
-            const int layer = treepieces_quad_uv(q, record[3], cell, j->bark[0].width, k, uv[k]);
+            const int layer = treepieces_quad_uv(q, shape->record[3], cell, j->bark[0].width, k, uv[k]);
             uv[k][1] = ((float)layer + uv[k][1]) / TREEPIECES_OWN;
         }
         for (int k = 0; k < 6; k++) put_corner(m, &corner, q->corners[order[k]], uv[order[k]]);
@@ -149,15 +203,6 @@ static int make_piece(tree_job *j, int type, mesh_data *m) {
     return CLI_DONE;
 }
 
-/* The species of each node of the forest; NULL without memory. */
-static unsigned char *list_species(const tree_job *j) {
-    const treepieces_forest *f = j->forest;
-    unsigned char *species = (unsigned char *)new_array(f->node_count, 1);
-    for (int t = 0; t < f->tree_count && species; t++)
-        memset(species + f->trees[t].first_node, f->trees[t].species, f->trees[t].node_count);
-    return species;
-}
-
 /* The factor from the picture's color to the species' bark. */
 static void bark_factor(const treepieces_species *species, const float tint[3],
                         unsigned char factor[4]) {
@@ -170,27 +215,41 @@ static void bark_factor(const treepieces_species *species, const float tint[3],
     factor[3] = 255;
 }
 
-static int copy_pieces(tree_job *j, int type, const unsigned char *species, const float tint[3],
-                       tree_copies *copies) {
-    const treepieces_batch *b = &j->forest->batches[type];
-    const int own = copies->count;
-    mesh_instances *t = new_copies(j, copies, b->count, &j->bark_materials[0],
-                                   treepieces_kit_piece(j->kit, type)->name);
-    if (!t) return CLI_FAILED;
-    if (j->species_count > 1 && !j->tiles) {
-        copies->colors[own] = (unsigned char *)new_array(b->count, 4);
-        if (!copies->colors[own]) return fail_memory(&j->run);
-        t->colors = copies->colors[own];
-    }
-    for (uint32_t i = 0; i < b->count; i++) {
+/* The species of each node of the part. 0: no memory. */
+static int list_species(gathering *g) {
+    const treepieces_forest *f = g->j->forest;
+    free(g->species);
+    g->species = (unsigned char *)new_array(f->node_count, 1);
+    for (int t = 0; t < f->tree_count && g->species; t++)
+        memset(g->species + f->trees[t].first_node, f->trees[t].species, f->trees[t].node_count);
+    return g->species != NULL;
+}
+
+/* A run of the copies of a type. */
+static void place_pieces(void *context, int run) {
+    const gathering *g = (const gathering *)context;
+    const treepieces_batch *b = &g->j->forest->batches[g->type];
+    const copy_list *list = &g->copies->lists[g->type];
+    const uint32_t start = (uint32_t)run * RUN, end = b->count - start < RUN ? b->count : start + RUN;
+    for (uint32_t i = start; i < end; i++) {
         const uint32_t node = b->words[(size_t)i * b->stride];
-        const float *bone = bone_of(j, node), place[3] = {bone[3], bone[7], bone[11]};
-        place_copy(t, i, place, tree_bone_rotation(bone), column_length(bone, 0),
+        const float *bone = bone_of(g->j, node), place[3] = {bone[3], bone[7], bone[11]};
+        place_copy(list, g->first + i, place, tree_bone_rotation(bone), column_length(bone, 0),
                    column_length(bone, 1));
-        if (t->colors)
-            bark_factor(&j->species[species[node]], tint, copies->colors[own] + 4 * (size_t)i);
+        if (g->has_colors) memcpy(list->colors + 4 * (g->first + i), g->factors[g->species[node]], 4);
     }
-    return make_piece(j, type, &copies->meshes[own]);
+}
+
+static int copy_pieces(gathering *g, int type, int done) {
+    const uint32_t count = g->j->forest->batches[type].count;
+    copy_list *list = &g->copies->lists[type];
+    const int status = reserve(g, list, count, done, g->has_colors);
+    if (status) return status;
+    g->type = type;
+    g->first = list->count;
+    txm_parallel_for(&g->j->run.env, (int)((count + RUN - 1) / RUN), place_pieces, g);
+    list->count += count;
+    return CLI_DONE;
 }
 
 /* ---- leaf clouds --------------------------------------------------------------------------- */
@@ -222,10 +281,19 @@ static int make_cloud(tree_job *j, const treepieces_species *species, uint32_t l
     return status;
 }
 
+/* How many different clouds a species has. */
+static uint32_t count_looks(const tree_job *j) {
+    return j->species_count == 1 ? CLOUDS : 1;
+}
+
+/* The list of a cloud. */
+static copy_list *list_of_cloud(tree_copies *copies, uint32_t looks, int species, uint32_t look) {
+    return &copies->lists[TREEPIECES_MAX_TYPES + (uint32_t)species * looks + look % looks];
+}
+
 /* A cloud is placed as in treepieces_bake_leaves, and turned about y by one of eight turns, since
    there are fewer different clouds here. */
-static void place_cloud(const tree_job *j, const treepieces_cluster *c, const mesh_instances *t,
-                        size_t i) {
+static void place_cloud(const tree_job *j, const treepieces_cluster *c, copy_list *list) {
     static const double eighths[8] = {0, 0.38268343236508977, 0.70710678118654752, 0.92387953251128676,
                                       1, 0.92387953251128676, 0.70710678118654752, 0.38268343236508977};
     const float *bone = bone_of(j, c->node);
@@ -233,54 +301,217 @@ static void place_cloud(const tree_job *j, const treepieces_cluster *c, const me
     const txm_quat q = {0, eighths[turn], 0, turn < 4 ? eighths[4 - turn] : -eighths[turn - 4]};
     const float center[3] = {bone[3] + c->along * bone[1], bone[7] + c->along * bone[5],
                              bone[11] + c->along * bone[9]};
-    place_copy(t, i, center, q, c->radius, c->radius);
+    place_copy(list, list->count++, center, q, c->radius, c->radius);
 }
 
-static int copy_cloud(tree_job *j, int s, uint32_t look, uint32_t looks,
-                      const unsigned char *species, tree_copies *copies) {
-    const treepieces_forest *f = j->forest;
-    const int own = copies->count;
-    char name[48];
-    size_t count = 0;
-    for (int fill = 0; fill < 2; fill++) {
-        mesh_instances *t = NULL;
-        if (fill) {
-            snprintf(name, sizeof name, "leaves %d", own);
-            t = count ? new_copies(j, copies, count, &j->leaf_materials[s], name) : NULL;
-            if (!t) return count ? CLI_FAILED : CLI_DONE;
-            count = 0;
+static int copy_clouds(gathering *g, int done) {
+    const treepieces_forest *f = g->j->forest;
+    const uint32_t looks = count_looks(g->j);
+    size_t more[MAX_SPECIES][CLOUDS] = {{0}};
+    int status = CLI_DONE;
+    for (int pass = 0; pass < 2 && !status; pass++) {
+        for (int t = 0; t < f->tree_count; t++) {
+            const treepieces_tree *tree = &f->trees[t];
+            if (g->j->species[tree->species].leaf_count == 0) continue;
+            for (uint32_t i = 0; i < tree->cluster_count; i++) {
+                const treepieces_cluster *c = &f->clusters[tree->first_cluster + i];
+                if (pass) place_cloud(g->j, c, list_of_cloud(g->copies, looks, tree->species, c->look));
+                else more[tree->species][c->look % looks]++;
+            }
         }
-        for (uint32_t i = 0; i < f->cluster_count; i++) {
-            const treepieces_cluster *c = &f->clusters[i];
-            if (species[c->node] != s || c->look % looks != look) continue;
-            if (fill) place_cloud(j, c, t, count);
-            count++;
+        for (int s = 0; s < g->j->species_count && !pass; s++)
+            for (uint32_t look = 0; look < looks && !status; look++)
+                status = reserve(g, list_of_cloud(g->copies, looks, s, look), more[s][look], done, 0);
+    }
+    return status;
+}
+
+/* ---- part by part --------------------------------------------------------------------------- */
+
+/* The progress of the part becomes that of all. */
+static int report(void *user, float fraction, const char *stage) {
+    const gathering *g = (const gathering *)user;
+    return g->progress(g->progress_user, g->from + g->share * fraction, stage);
+}
+
+/* Grow a part, and let its progress be that from `from` on, of that share. */
+static int grow_part(gathering *g, const treepieces_place *places, int count, float from, float share) {
+    g->from = from;
+    g->share = share;
+    return tree_grow_places(g->j, places, count);
+}
+
+/* Note how many pieces of each type each tree of the part has. */
+static void count_pieces(const gathering *g, int first) {
+    const treepieces_forest *f = g->j->forest;
+    for (int t = 0; t < f->tree_count; t++) {
+        uint16_t *counts = g->counts + (size_t)(first + t) * (size_t)g->types;
+        const treepieces_node *nodes = f->nodes + f->trees[t].first_node;
+        for (uint32_t i = 0; i < f->trees[t].node_count; i++) counts[nodes[i].type]++;
+    }
+}
+
+/* All trees, of which only the copies are kept; the last part stays. */
+static int copy_trees(gathering *g) {
+    const int trees = g->j->count;
+    int status = CLI_DONE;
+    for (int first = 0; first < trees && !status; first += g->part) {
+        const int left = trees - first, count = left < g->part ? left : g->part;
+        status = grow_part(g, g->places + first, count, 0.9f * (float)first / (float)trees,
+                           0.9f * (float)count / (float)trees);
+        cli_stage(&g->j->run, "build");
+        if (!status && g->has_colors && !list_species(g)) status = fail_memory(&g->j->run);
+        if (status) return status;
+        tree_count(g->j);
+        count_pieces(g, first);
+        for (int type = 0; type < g->types && !status; type++) status = copy_pieces(g, type, first + count);
+        if (!status) status = copy_clouds(g, first + count);
+    }
+    return status;
+}
+
+/* Is instance i of so many of a type one of those for the mean shape? */
+static int is_sampled(size_t count, size_t i) {
+    return i % (count / SAMPLED + 1) == 0;
+}
+
+/* Does tree t have an instance for the mean shape, or one whose tiles show? before: instances by type
+   that earlier trees have. */
+static int has_sample(const gathering *g, int t, const size_t before[TREEPIECES_MAX_TYPES]) {
+    for (int type = 0; type < g->types; type++) {
+        const size_t all = g->copies->lists[type].count, step = all / SAMPLED + 1;
+        const size_t next = (before[type] + step - 1) / step * step;
+        const size_t end = before[type] + g->counts[(size_t)t * (size_t)g->types + (size_t)type];
+        if (next < end || (all / 2 >= before[type] && all / 2 < end)) return 1;
+    }
+    return 0;
+}
+
+/* Add the samples of a part, whose trees have these numbers, to the shapes. *next: the first tree of the
+   forest whose instances are not in `before`. */
+static void add_samples(gathering *g, const int *trees, int count, int *next, size_t before[TREEPIECES_MAX_TYPES]) {
+    uint32_t instance[TREEPIECES_MAX_TYPES] = {0}; /* in the part */
+    for (int t = 0; t < count; t++) {
+        for (; *next <= trees[t]; ++*next) {
+            for (int type = 0; type < g->types; type++) {
+                const size_t all = g->copies->lists[type].count;
+                const treepieces_batch *b = &g->j->forest->batches[type];
+                const uint16_t own = g->counts[(size_t)*next * (size_t)g->types + (size_t)type];
+                for (uint16_t i = 0; i < own && *next == trees[t]; i++, instance[type]++) {
+                    if (is_sampled(all, before[type] + i)) add_shape(g->j, type, instance[type], &g->shapes[type]);
+                    if (before[type] + i == all / 2)
+                        memcpy(g->shapes[type].record, b->words + (size_t)instance[type] * b->stride,
+                               b->stride * sizeof(uint32_t));
+                }
+                before[type] += own;
+            }
         }
     }
-    return make_cloud(j, &j->species[s], look, &copies->meshes[own]);
+}
+
+/* The sums for the mean shapes. The trees with samples grow once more unless all are there. */
+static int gather_shapes(gathering *g) {
+    tree_job *j = g->j;
+    size_t before[TREEPIECES_MAX_TYPES] = {0};
+    int count = 0, next = 0, status = CLI_DONE;
+    for (int t = 0; t < j->count; t++) {
+        if (j->count <= g->part || has_sample(g, t, before)) g->sampled[count++] = t;
+        for (int type = 0; type < g->types; type++)
+            before[type] += g->counts[(size_t)t * (size_t)g->types + (size_t)type];
+    }
+    memset(before, 0, sizeof before);
+    for (int first = 0; first < count && !status; first += g->part) {
+        const int left = count - first, trees = left < g->part ? left : g->part;
+        if (j->count > g->part) {
+            for (int t = 0; t < trees; t++) g->places[t] = g->places[g->sampled[first + t]];
+            status = grow_part(g, g->places, trees, 0.9f + 0.1f * (float)first / (float)count,
+                               0.1f * (float)trees / (float)count);
+            cli_stage(&j->run, "build");
+        }
+        if (!status) add_samples(g, g->sampled + first, trees, &next, before);
+    }
+    return status;
 }
 
 /* ---- all of it ----------------------------------------------------------------------------- */
 
-int tree_make_copies(tree_job *j, const float tint[3], tree_copies *copies) {
-    unsigned char *species = list_species(j);
-    int status = species ? CLI_DONE : fail_memory(&j->run);
-    memset(copies, 0, sizeof *copies);
-    for (int type = 0; type < j->forest->type_count && !status; type++)
-        if (j->forest->batches[type].count) status = copy_pieces(j, type, species, tint, copies);
-    for (int s = 0; s < j->species_count; s++) {
-        const uint32_t looks = j->species_count == 1 ? CLOUDS : 1;
-        for (uint32_t look = 0; look < looks && j->species[s].leaf_count && !status; look++)
-            status = copy_cloud(j, s, look, looks, species, copies);
+static int prepare(gathering *g, const float tint[3]) {
+    tree_job *j = g->j;
+    const size_t count = (size_t)j->count;
+    const int most = j->pieces ? j->pieces : 600;
+    int status = tree_make_kit(j);
+    if (status) return status;
+    g->types = treepieces_kit_count(j->kit);
+    g->part = PART_PIECES / most > 1 ? PART_PIECES / most : 1;
+    if (j->count <= WHOLE_PIECES / most) g->part = j->count;
+    g->has_colors = j->species_count > 1 && !j->tiles;
+    for (int s = 0; s < j->species_count; s++) bark_factor(&j->species[s], tint, g->factors[s]);
+    g->places = (treepieces_place *)new_array(count, sizeof *g->places);
+    g->counts = (uint16_t *)new_array(count, (size_t)g->types * sizeof *g->counts);
+    g->sampled = (int *)new_array(count, sizeof *g->sampled);
+    g->shapes = (piece_shape *)new_array((size_t)g->types, sizeof *g->shapes);
+    if (!g->places || !g->counts || !g->sampled || !g->shapes) return fail_memory(&j->run);
+    const treepieces_forest_desc desc = tree_forest_desc(j);
+    return check_result(&j->run, treepieces_scatter(&desc, &j->run.env, g->places), j->species[0].name);
+}
+
+static int make_meshes(gathering *g) {
+    tree_job *j = g->j;
+    tree_copies *copies = g->copies;
+    const uint32_t looks = count_looks(j);
+    char name[48];
+    int status = CLI_DONE;
+    for (int type = 0; type < g->types && !status; type++) {
+        if (copies->lists[type].count == 0) continue;
+        mesh_data *m = add_instances(copies, &copies->lists[type], &j->bark_materials[0],
+                                     treepieces_kit_piece(j->kit, type)->name);
+        status = make_piece(j, type, &g->shapes[type], m);
     }
-    free(species);
+    for (int s = 0; s < j->species_count; s++) {
+        for (uint32_t look = 0; look < looks && !status; look++) {
+            const copy_list *list = list_of_cloud(copies, looks, s, look);
+            if (list->count == 0) continue;
+            snprintf(name, sizeof name, "leaves %d", copies->count);
+            status = make_cloud(j, &j->species[s], look,
+                                add_instances(copies, list, &j->leaf_materials[s], name));
+        }
+    }
+    return status;
+}
+
+int tree_make_copies(tree_job *j, const float tint[3], tree_copies *copies) {
+    gathering g;
+    env_keep_memory();
+    memset(&g, 0, sizeof g);
+    memset(copies, 0, sizeof *copies);
+    g.j = j;
+    g.copies = copies;
+    g.progress = j->run.env.progress;
+    g.progress_user = j->run.env.progress_user;
+    int status = prepare(&g, tint);
+    j->run.env.progress = report;
+    j->run.env.progress_user = &g;
+    if (!status) status = copy_trees(&g);
+    if (!status) status = gather_shapes(&g);
+    j->run.env.progress = g.progress;
+    j->run.env.progress_user = g.progress_user;
+    if (!status) tree_report(j);
+    if (!status) status = make_meshes(&g);
+    free(g.places);
+    free(g.counts);
+    free(g.sampled);
+    free(g.shapes);
+    free(g.species);
+    tree_fell(j);
     return status;
 }
 
 void tree_free_copies(tree_copies *copies) {
-    for (int i = 0; i < copies->count; i++) {
-        mesh_free(&copies->meshes[i]);
-        free(copies->blocks[i]);
-        if (i < TREEPIECES_MAX_TYPES) free(copies->colors[i]);
+    for (int i = 0; i < copies->count; i++) mesh_free(&copies->meshes[i]);
+    for (int i = 0; i < MAX_COPIED; i++) {
+        free(copies->lists[i].translations);
+        free(copies->lists[i].rotations);
+        free(copies->lists[i].scales);
+        free(copies->lists[i].colors);
     }
 }

@@ -23,13 +23,18 @@ tree_job *new_tree_job(int is_forest) {
     return j;
 }
 
-void tree_fell(tree_job *j) {
+/* Of the trees that there are. */
+static void free_trees(tree_job *j) {
     free(j->rest);
     free(j->posed);
     treepieces_forest_free(j->forest);
-    treepieces_kit_free(j->kit);
     j->rest = j->posed = NULL;
     j->forest = NULL;
+}
+
+void tree_fell(tree_job *j) {
+    free_trees(j);
+    treepieces_kit_free(j->kit);
     j->kit = NULL;
 }
 
@@ -50,6 +55,10 @@ int tree_is_glb(const tree_job *j) {
 
 int tree_is_bare(const tree_job *j) {
     return !strcmp(j->extension, ".ply") || !strcmp(j->extension, ".stl");
+}
+
+int tree_is_copied(const tree_job *j) {
+    return j->is_forest && tree_is_glb(j) && !j->variants;
 }
 
 /* ---- species ------------------------------------------------------------------------------- */
@@ -122,14 +131,20 @@ static void place_at_origin(const tree_job *j, treepieces_place *places, int cou
     }
 }
 
-static int grow(tree_job *j) {
-    treepieces_place places[MAX_VARIANTS] = {{{0, 0, 0}, 0, 0, 0, 0}};
+int tree_make_kit(tree_job *j) {
+    if (j->kit) return CLI_DONE;
+    return check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
+}
+
+/* places NULL: all trees of the forest, on the grid */
+static int grow(tree_job *j, const treepieces_place *places, int count) {
     treepieces_forest_desc desc = tree_forest_desc(j);
-    if (!j->is_forest || j->variants) {
-        desc.places = places;
-        desc.tree_count = j->is_forest ? j->variants : 1;
-        place_at_origin(j, places, desc.tree_count);
-    }
+    desc.places = places;
+    desc.tree_count = count;
+    cli_stage(&j->run, "grow");
+    const int status = tree_make_kit(j);
+    if (status) return status;
+    desc.kit = j->kit;
     return check_result(&j->run, treepieces_forest_make(&desc, &j->run.env, &j->forest),
                         j->species[0].name);
 }
@@ -142,6 +157,7 @@ static int pose(tree_job *j) {
     const treepieces_wind wind = tree_wind(j);
     const int has_rig = tree_is_glb(j) && !j->is_forest && !j->wind_attributes;
     txm_status result = TXM_OK;
+    cli_stage(&j->run, "pose");
     j->posed = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
     if (has_rig) j->rest = (float *)new_array(nodes, TREEPIECES_BONE * sizeof(float));
     if (!j->posed || (has_rig && !j->rest)) return fail_memory(&j->run);
@@ -158,27 +174,41 @@ static int pose(tree_job *j) {
     return check_result(&j->run, result, j->species[0].name);
 }
 
-static void grown_figures(tree_job *j) {
+void tree_count(tree_job *j) {
     const treepieces_forest *f = j->forest;
-    float height = 0;
     for (int t = 0; t < f->tree_count; t++)
-        if (f->trees[t].height > height) height = f->trees[t].height;
+        if (f->trees[t].height > j->grown.height) j->grown.height = f->trees[t].height;
+    j->grown.pieces += f->node_count;
+    j->grown.clusters += f->cluster_count;
+    j->grown.bytes += f->bytes;
+}
+
+void tree_report(tree_job *j) {
+    const int trees = j->variants ? j->variants : j->count;
     cli_figure(&j->run, "trees", j->count);
-    cli_figure(&j->run, "pieces", f->node_count);
-    cli_figure(&j->run, "clusters", f->cluster_count);
-    cli_figure(&j->run, "height", (double)height);
-    cli_figure(&j->run, "bytes_per_tree", (double)f->bytes / f->tree_count);
+    cli_figure(&j->run, "pieces", (double)j->grown.pieces);
+    cli_figure(&j->run, "clusters", (double)j->grown.clusters);
+    cli_figure(&j->run, "height", (double)j->grown.height);
+    cli_figure(&j->run, "bytes_per_tree", (double)j->grown.bytes / trees);
 }
 
 int tree_grow(tree_job *j) {
-    cli_stage(&j->run, "grow");
-    int status =
-        check_result(&j->run, treepieces_kit_make(NULL, 0, &j->run.env, &j->kit), "pieces");
-    if (!status) status = grow(j);
+    treepieces_place places[MAX_VARIANTS] = {{{0, 0, 0}, 0, 0, 0, 0}};
+    const int on_grid = j->is_forest && !j->variants;
+    const int count = on_grid ? j->count : j->is_forest ? j->variants : 1;
+    if (!on_grid) place_at_origin(j, places, count);
+    const int status = grow(j, on_grid ? NULL : places, count);
     if (status) return status;
-    if (!j->lod) grown_figures(j);
-    cli_stage(&j->run, "pose");
+    memset(&j->grown, 0, sizeof j->grown);
+    tree_count(j);
+    if (!j->lod) tree_report(j);
     return pose(j);
+}
+
+int tree_grow_places(tree_job *j, const treepieces_place *places, int count) {
+    free_trees(j);
+    const int status = grow(j, places, count);
+    return status ? status : pose(j);
 }
 
 /* ---- bones --------------------------------------------------------------------------------- */

@@ -130,20 +130,30 @@ int mesh_can_write(const char *extension, const char **why) {
     return *why = "end the name in .obj, .ply, .stl or .glb", 0;
 }
 
-int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
-                const char **why) {
-    sink s = sink_new();
+static int write_scene(const char *extension, const mesh_scene *scene, sink *s, const char **why) {
     mesh_material own;
     const int is_glb = !strcmp(extension, ".glb");
-    *bytes = NULL;
     if (!mesh_can_write(extension, why)) return 0;
     if (!is_glb && !scene_part_count(scene)) return *why = "there is no surface to write", 0;
     int ok;
-    if (is_glb) ok = mesh_write_glb(scene, &s);
+    if (is_glb) ok = mesh_write_glb(scene, s);
     else if (!strcmp(extension, ".ply"))
-        ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &scene->place, &s);
-    else if (!strcmp(extension, ".stl")) ok = mesh_write_stl(scene, &s);
-    else ok = mesh_write_obj(scene, &s);
-    if (!ok) s.failed = 1;
-    return sink_finish(&s, bytes, size, why);
+        ok = mesh_write_ply(scene_part(scene, 0, &own).mesh, &scene->place, s);
+    else if (!strcmp(extension, ".stl")) ok = mesh_write_stl(scene, s);
+    else ok = mesh_write_obj(scene, s);
+    if (!ok) s->failed = 1;
+    return 1;
+}
+
+int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
+                const char **why) {
+    sink s = sink_new();
+    *bytes = NULL;
+    return write_scene(extension, scene, &s, why) && sink_finish(&s, bytes, size, why);
+}
+
+int mesh_encode_extents(const char *extension, const mesh_scene *scene, mesh_file *file, const char **why) {
+    sink s = sink_new();
+    memset(file, 0, sizeof *file);
+    return write_scene(extension, scene, &s, why) && sink_finish_extents(&s, file, why);
 }

@@ -211,14 +211,32 @@ static inline uint32_t u32_at(const unsigned char *p) {
 
 /* ---- a file in the making: mesh_bytes.c -------------------------------------------------- */
 
+/* Bytes of others, which stand in a file behind so many of its own. */
+typedef struct loan {
+    size_t behind;
+    file_extent bytes;
+} loan;
+
 /* A file in the making; a failed allocation is seen at the end. */
 typedef struct sink {
     list bytes;
+    list loans;  /* by `behind` */
+    list blocks; /* for free(), in which some of the loans lie */
+    size_t lent; /* bytes of all loans */
     int failed;
 } sink;
 
 sink sink_new(void);
+void sink_free(sink *s);
 void sink_put(sink *s, const void *bytes, size_t n);
+
+/* How many bytes it has. */
+static inline size_t sink_size(const sink *s) {
+    return s->bytes.count + s->lent;
+}
+
+/* All that is in from, which is empty then. Its bytes are not copied. */
+void sink_move(sink *s, sink *from);
 
 /* Formatted text of at most 255 characters; more is cut off. */
 void sink_print(sink *s, const char *format, ...)
@@ -231,10 +249,14 @@ void sink_print(sink *s, const char *format, ...)
 void sink_u16(sink *s, uint32_t v);
 void sink_u32(sink *s, uint32_t v);
 void sink_floats(sink *s, const float *v, size_t n);
+
+/* The same numbers, which the sink need not copy: they stay as they are until the file is written. */
+void sink_lend_floats(sink *s, const float *v, size_t n);
 void sink_doubles(sink *s, const double *v, size_t n);
 
-/* Its bytes for free(). */
+/* Its bytes for free(), or as extents. Either releases the sink. */
 int sink_finish(sink *s, unsigned char **bytes, size_t *size, const char **why);
+int sink_finish_extents(sink *s, mesh_file *file, const char **why);
 
 /* ---- where a mesh lies: mesh_place.c ----------------------------------------------------- */
 

@@ -25,6 +25,7 @@ typedef struct glb {
     int material_count;
 } glb;
 
+/* Text, in which nothing is lent. */
 static void append(sink *to, const sink *from) {
     sink_put(to, from->bytes.items, from->bytes.count);
     to->failed |= from->failed;
@@ -33,12 +34,12 @@ static void append(sink *to, const sink *from) {
 /* The bytes since start become a view; target 0: none. Returns its number. */
 static int glb_view(glb *g, size_t start, int target) {
     sink *s = &g->views;
-    const size_t length = g->binary.bytes.count - start;
+    const size_t length = sink_size(&g->binary) - start;
     sink_print(s, "%s{\"buffer\":0,\"byteOffset\":%lu,\"byteLength\":%lu", g->view_count ? "," : "",
                (unsigned long)start, (unsigned long)length);
     if (target) sink_print(s, ",\"target\":%d", target);
     sink_print(s, "}");
-    while (g->binary.bytes.count % 4 && !g->binary.failed) sink_put(&g->binary, "\0", 1);
+    while (sink_size(&g->binary) % 4 && !g->binary.failed) sink_put(&g->binary, "\0", 1);
     return g->view_count++;
 }
 
@@ -128,7 +129,7 @@ static void add_tangent(const mesh_data *m, const flat_mesh *f, size_t triangle,
 
 /* The directions of u on the surface, for normal maps: programs make their own differently. 0: no memory */
 static int glb_tangents(glb *g, const mesh_data *m, const flat_mesh *f) {
-    const size_t start = g->binary.bytes.count;
+    const size_t start = sink_size(&g->binary);
     double *sums = (double *)calloc(4 * f->count + 1, sizeof *sums);
     if (!sums) return 0;
     for (size_t t = 0; t < m->triangle_count; t++) add_tangent(m, f, t, sums);
@@ -166,14 +167,14 @@ static void put_color(sink *s, const unsigned char *c) {
    without weight is written as joint 0, as validators require. */
 static void glb_weights(glb *g, const mesh_data *m, const flat_mesh *f) {
     sink *bin = &g->binary, *s = &g->meshes;
-    size_t start = bin->bytes.count;
+    size_t start = sink_size(bin);
     for (size_t i = 0; i < f->count; i++) {
         const size_t v = 4 * flat_vertex(f, i);
         for (size_t k = 0; k < 4; k++) sink_u16(bin, m->weights[v + k] > 0 ? m->joints[v + k] : 0);
     }
     sink_print(s, ",\"JOINTS_0\":%d",
                glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT, f->count, "VEC4", NULL));
-    start = bin->bytes.count;
+    start = sink_size(bin);
     for (size_t i = 0; i < f->count; i++) {
         const float *w = m->weights + 4 * flat_vertex(f, i);
         float unit[4] = {w[0], w[1], w[2], w[3]};
@@ -205,7 +206,7 @@ static int glb_triangles(glb *g, const mesh_data *m, const flat_mesh *f, size_t 
     const int is_short = f->count < 65535; /* 65535 itself is not an index */
     if (!s->failed) sink_put(&attributes, (const char *)s->bytes.items + opening, s->bytes.count - opening);
     for (size_t first = 0, end; first < m->triangle_count || first == 0; first = end) {
-        const size_t start = bin->bytes.count;
+        const size_t start = sink_size(bin);
         const char *name = m->materials ? mesh_material_name(m, m->materials[first])
                            : material   ? material->name
                                         : NULL;
@@ -225,7 +226,7 @@ static int glb_triangles(glb *g, const mesh_data *m, const flat_mesh *f, size_t 
         if (end == 0) break;
     }
     const int ok = !attributes.failed;
-    list_free(&attributes.bytes);
+    sink_free(&attributes);
     return ok;
 }
 
@@ -234,7 +235,7 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
     flat_mesh f;
     sink *bin = &g->binary, *s = &g->meshes;
     float bounds[6] = {0, 0, 0, 0, 0, 0};
-    size_t start = bin->bytes.count;
+    size_t start = sink_size(bin);
     if (!flat_make(m, BY_NORMAL | (m->colors ? 0 : BY_FACE), &f)) return 0;
 
     for (size_t i = 0; i < f.count; i++) {
@@ -249,7 +250,7 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
     sink_print(s, "{\"attributes\":{\"POSITION\":%d",
                glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", bounds));
     if (m->normals || m->corner_normals) {
-        start = bin->bytes.count;
+        start = sink_size(bin);
         for (size_t i = 0; i < f.count; i++) {
             float unit[3];
             unit_normal(normal_of(m, &f, i), unit);
@@ -259,20 +260,20 @@ static int glb_primitive(glb *g, const mesh_data *m, const mesh_material *materi
                    glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC3", NULL));
     }
     if (m->uvs) {
-        start = bin->bytes.count;
+        start = sink_size(bin);
         for (size_t i = 0; i < f.count; i++) sink_floats(bin, flat_uv(&f, i), 2);
         sink_print(s, ",\"TEXCOORD_0\":%d",
                    glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
     }
     for (size_t set = 0; set < MESH_WIND / 2 && m->wind; set++) {
-        start = bin->bytes.count;
+        start = sink_size(bin);
         for (size_t i = 0; i < f.count; i++)
             sink_floats(bin, m->wind + MESH_WIND * flat_vertex(&f, i) + 2 * set, 2);
         sink_print(s, ",\"TEXCOORD_%d\":%d", (int)set + 1,
                    glb_accessor(g, start, GL_ARRAY, GL_FLOAT, f.count, "VEC2", NULL));
     }
     if (m->colors || m->face_colors) {
-        start = bin->bytes.count;
+        start = sink_size(bin);
         for (size_t i = 0; i < f.count; i++) put_color(bin, flat_color(&f, i));
         sink_print(s, ",\"COLOR_0\":%d",
                    glb_accessor(g, start, GL_ARRAY, GL_UNSIGNED_SHORT | NORMALIZED, f.count, "VEC4",
@@ -338,18 +339,19 @@ static int glb_instances(glb *g, const mesh_instances *t) {
                g->mesh_count - 1);
     for (int k = 0, written = 0; k < 3; k++) {
         if (!lists[k].values) continue;
-        const size_t start = bin->bytes.count;
-        sink_floats(bin, lists[k].values, lists[k].count * t->count);
+        const size_t start = sink_size(bin);
+        sink_lend_floats(bin, lists[k].values, lists[k].count * t->count);
         sink_print(s, "%s\"%s\":%d", written++ ? "," : "", lists[k].name,
                    glb_accessor(g, start, 0, GL_FLOAT, t->count, lists[k].type, NULL));
     }
     if (t->colors) { /* three floats, which all viewers that support it can read */
-        const size_t start = bin->bytes.count;
+        const size_t start = sink_size(bin);
+        float linear[256], color[3];
+        for (int v = 0; v < 256; v++) linear[v] = txm_srgb_to_linear((float)v / 255.0f);
+        if (!list_reserve(&bin->bytes, bin->bytes.count + sizeof color * t->count)) bin->failed = 1;
         for (size_t i = 0; i < t->count; i++) {
-            float linear[3];
-            for (size_t k = 0; k < 3; k++)
-                linear[k] = txm_srgb_to_linear((float)t->colors[4 * i + k] / 255.0f);
-            sink_floats(bin, linear, 3);
+            for (size_t k = 0; k < 3; k++) color[k] = linear[t->colors[4 * i + k]];
+            sink_floats(bin, color, 3);
         }
         sink_print(s, ",\"_COLOR_0\":%d",
                    glb_accessor(g, start, 0, GL_FLOAT, t->count, "VEC3", NULL));
@@ -421,7 +423,7 @@ static int glb_joints(glb *g, const mesh_skeleton *k) {
 /* The skin, and the animation if there is one; first: node of joint 0. */
 static void glb_skin(glb *g, const mesh_skeleton *k, int first) {
     sink *s = &g->more, *bin = &g->binary;
-    size_t start = bin->bytes.count;
+    size_t start = sink_size(bin);
     for (int i = 0; i < k->joint_count; i++) sink_floats(bin, k->joints[i].bind, 16);
     sink_print(s, ",\"skins\":[{\"skeleton\":%d,\"inverseBindMatrices\":%d,\"joints\":[", first,
                glb_accessor(g, start, 0, GL_FLOAT, (size_t)k->joint_count, "MAT4", NULL));
@@ -430,12 +432,12 @@ static void glb_skin(glb *g, const mesh_skeleton *k, int first) {
     if (k->key_count == 0) return;
     const size_t keys = (size_t)k->key_count;
     const float bounds[2] = {k->times[0], k->times[keys - 1]};
-    start = bin->bytes.count;
+    start = sink_size(bin);
     sink_floats(bin, k->times, keys);
     const int times = glb_accessor(g, start, 0, GL_FLOAT, keys, "SCALAR", bounds);
     sink_print(s, ",\"animations\":[{\"name\":\"%.60s\",\"samplers\":[", k->clip);
     for (int i = 0; i < k->joint_count; i++) {
-        start = bin->bytes.count;
+        start = sink_size(bin);
         sink_floats(bin, k->turns + 4 * keys * (size_t)i, 4 * keys);
         sink_print(s, "%s{\"input\":%d,\"output\":%d}", i ? "," : "", times,
                    glb_accessor(g, start, 0, GL_FLOAT, keys, "VEC4", NULL));
@@ -492,7 +494,7 @@ static int has_picture(const glb *g, int i, int *first) {
 }
 
 static void print_png(glb *g, const unsigned char *png, size_t size, sink *json) {
-    const size_t start = g->binary.bytes.count;
+    const size_t start = sink_size(&g->binary);
     put_png(&g->binary, png, size);
     sink_print(json, "{\"bufferView\":%d,\"mimeType\":\"image/png\"}", glb_view(g, start, 0));
 }
@@ -614,8 +616,8 @@ static void print_document(glb *g, const mesh_scene *scene, int instanced, int j
     append(json, &g->accessors);
     sink_print(json, "],\"bufferViews\":[");
     append(json, &g->views);
-    sink_print(json, "],\"buffers\":[{\"byteLength\":%lu}]}", (unsigned long)g->binary.bytes.count);
-    while (json->bytes.count % 4 && !json->failed) sink_put(json, " ", 1);
+    sink_print(json, "],\"buffers\":[{\"byteLength\":%lu}]}", (unsigned long)sink_size(&g->binary));
+    while (sink_size(json) % 4 && !json->failed) sink_put(json, " ", 1);
 }
 
 /* All surfaces as one mesh, instances, objects, joints: nodes in this order. Returns the first joint's node,
@@ -659,25 +661,25 @@ int mesh_write_glb(const mesh_scene *scene, sink *s) {
     const int joint = glb_scene(&g, scene, &own);
     for (int i = 0; i < scene->instance_count; i++) instanced |= scene->instances[i].count > 0;
     if (joint >= 0) print_document(&g, scene, instanced, joint, &json);
-    const int ok = joint >= 0 && g.binary.bytes.count <= 0x7fffffff; /* lengths are 32 bits */
+    const int ok = joint >= 0 && sink_size(&g.binary) <= 0x7fffffff; /* lengths are 32 bits */
     if (ok) {
-        const size_t total = 12 + 8 + json.bytes.count + 8 + g.binary.bytes.count;
+        const size_t length = sink_size(&json), total = 12 + 8 + length + 8 + sink_size(&g.binary);
         sink_put(s, "glTF", 4);
         sink_u32(s, 2);
         sink_u32(s, (uint32_t)total);
-        sink_u32(s, (uint32_t)json.bytes.count);
+        sink_u32(s, (uint32_t)length);
         sink_put(s, "JSON", 4);
-        append(s, &json);
-        sink_u32(s, (uint32_t)g.binary.bytes.count);
+        sink_move(s, &json);
+        sink_u32(s, (uint32_t)sink_size(&g.binary));
         sink_put(s, "BIN\0", 4);
-        append(s, &g.binary);
+        sink_move(s, &g.binary);
     }
-    list_free(&json.bytes);
-    list_free(&g.binary.bytes);
-    list_free(&g.views.bytes);
-    list_free(&g.accessors.bytes);
-    list_free(&g.meshes.bytes);
-    list_free(&g.nodes.bytes);
-    list_free(&g.more.bytes);
+    sink_free(&json);
+    sink_free(&g.binary);
+    sink_free(&g.views);
+    sink_free(&g.accessors);
+    sink_free(&g.meshes);
+    sink_free(&g.nodes);
+    sink_free(&g.more);
     return ok;
 }

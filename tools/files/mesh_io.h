@@ -14,6 +14,7 @@
 #ifndef MESH_IO_H
 #define MESH_IO_H
 
+#include "extent.h"
 #include "texmath.h"
 
 /* Where a mesh lies: in the file a position is origin + scale * that in memory. Floats have seven
@@ -203,6 +204,20 @@ int mesh_can_write(const char *extension, const char **why);
 /* Encode for that extension into a block for free(). */
 int mesh_encode(const char *extension, const mesh_scene *scene, unsigned char **bytes, size_t *size,
                 const char **why);
+
+/* A mesh file in extents. Those that are large arrays of the scene are not copied: they must stay as they
+   are until the file has been written. */
+typedef struct mesh_file {
+    file_extent *extents;
+    int count;
+    size_t size;    /* of all extents */
+    void **blocks;  /* in which the other extents lie */
+    int block_count;
+} mesh_file;
+
+/* The same as mesh_encode, into extents; mesh_file_free releases them. */
+int mesh_encode_extents(const char *extension, const mesh_scene *scene, mesh_file *file, const char **why);
+void mesh_file_free(mesh_file *file);
 
 /* The material that an OBJ with scene->library refers to. */
 int mesh_encode_mtl(const mesh_scene *scene, unsigned char **bytes, size_t *size, const char **why);
