@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "filekit.h"
+#include "threads.h"
 
 #include <stdio.h>
 #include <jpeglib.h>
@@ -354,6 +355,60 @@ static void round_trips(void **state) {
 }
 
 /* ---- JPEG ----------------------------------------------------------------------------------- */
+
+/* Samples that photographs, ramps, shadows and flat colours have, each in its own rows. */
+static unsigned sample_of(size_t x, size_t y, unsigned *noise) {
+    *noise = *noise * 1664525u + 1013904223u;
+    switch (y / 7 % 4) {
+    case 0: return (unsigned)(x + 3 * y) + (*noise >> 30);
+    case 1: return *noise >> 16;
+    case 2: return (unsigned)(x * x / 16 + y);
+    default: return 11000;
+    }
+}
+
+/* Bands of a PNG may be packed in any order: the same bytes, which are the picture. */
+static void png_in_bands(void **state) {
+    (void)state;
+    for (int kind = 0; kind < 8; kind++) {
+        const int channels = 1 + kind % 4, is_deep = kind >= 4;
+        unsigned noise = 1;
+        txm_image image, back;
+        const char *why;
+        assert_true(image_new(kind == 2 ? 70000 : 301, kind == 2 ? 9 : 2000, channels, is_deep ? TXM_U16 : TXM_U8, &image));
+        for (int y = 0; y < image.height; y++)
+            for (size_t i = 0; i < (size_t)image.width * (size_t)channels; i++) {
+                const unsigned v = sample_of(i / (size_t)channels, (size_t)y + i % (size_t)channels, &noise);
+                if (is_deep) ((uint16_t *)txm_image_row(&image, y))[i] = (uint16_t)(v & 65535u);
+                else ((uint8_t *)txm_image_row(&image, y))[i] = (uint8_t)(v & 255u);
+            }
+        unsigned char *bytes[2];
+        size_t size[2], chunks = 0;
+        for (int reverse = 0; reverse < 2; reverse++) {
+            txm_env env = {0};
+            image_job job = {0};
+            if (reverse) env.parallel_for = tk_parallel_reverse;
+            job.env = &env;
+            if (!image_encode(&job, ".png", &image, &bytes[reverse], &size[reverse], &why)) fail_msg("%s", why);
+        }
+        assert_int_equal(size[0], size[1]);
+        assert_memory_equal(bytes[0], bytes[1], size[0]);
+        for (size_t i = 0; i + 4 <= size[0]; i++) chunks += !memcmp(bytes[0] + i, "IDAT", 4);
+        assert_true(chunks > 2);
+        image_job job = new_job(0, 1);
+        if (!image_decode(&job, bytes[0], size[0], &back, &why)) fail_msg("%s", why);
+        assert_int_equal(warning_count, 0);
+        const size_t row = (size_t)image.width * (size_t)channels * txm_sample_bytes(image.sample);
+        /* gray with alpha is read as four channels */
+        assert_int_equal(back.channels, channels == 2 ? 4 : channels);
+        for (int y = 0; y < image.height && channels != 2; y++)
+            assert_memory_equal(txm_image_row_const(&back, y), txm_image_row_const(&image, y), row);
+        image_free(&image);
+        image_free(&back);
+        free(bytes[0]);
+        free(bytes[1]);
+    }
+}
 
 static void odd_ends(void **state) {
     (void)state;
@@ -723,6 +778,7 @@ int main(void) {
         cmocka_unit_test(exif_in_jpeg),     cmocka_unit_test(exif_in_png),
         cmocka_unit_test(exif_in_webp),     cmocka_unit_test(tiff_as_it_comes),
         cmocka_unit_test(round_trips),      cmocka_unit_test(odd_ends),
+        cmocka_unit_test(png_in_bands),
         cmocka_unit_test(cmyk),             cmocka_unit_test(progressive),
         cmocka_unit_test(bmp_of_all_kinds), cmocka_unit_test(bmp_of_runs),
         cmocka_unit_test(tga_of_all_kinds), cmocka_unit_test(pnm_of_all_kinds),

@@ -29,7 +29,7 @@ typedef struct image_job {
     int channels;       /* 0 keeps those of the file, 1 makes gray, 2 to 4 what it says        */
     int deep;           /* 1 keeps 16 bits a sample if the file has them: TXM_U16, else TXM_U8 */
     int max_side;       /* a longer side is refused before anything is decoded; 0 = 2^24       */
-    const txm_env *env; /* reports progress and cancels, nothing else of it is used; or NULL   */
+    const txm_env *env; /* reports progress and cancels; PNGs are written by its threads; or NULL */
     /* Called for what is worth a line to the user, though the picture was read: one English phrase
        that fits after "warning: 'x.jpg': ". NULL = silent.                                    */
     void (*warn)(void *user, const char *text);
