@@ -3813,6 +3813,7 @@ static void tpc_grow_slot(void *context, int i) {
     g->species = &p->desc->species[g->place.species];
     tpc_grow(g);
     tpc_assemble(g);
+    if (g->status == TXM_OK) tpc_set_modes(g->nodes, (uint32_t)g->node_count);
 }
 
 static txm_status tpc_make_slots(tpc_planting *p, txm_env *env) {
@@ -3889,7 +3890,6 @@ static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
         const tpc_growth *g = &p->slots[i];
         treepieces_tree *t = &p->trees[p->first + i];
         memcpy(p->nodes + p->node_count, g->nodes, (size_t)g->node_count * sizeof *p->nodes);
-        tpc_set_modes(p->nodes + p->node_count, (uint32_t)g->node_count);
         memcpy(p->bands + p->node_count, g->bands, (size_t)g->node_count * sizeof *p->bands);
         for (int k = 0; k < g->cluster_count; k++) {
             p->clusters[p->cluster_count + (size_t)k] = g->clusters[k];

@@ -11,7 +11,9 @@ enum { DRAWN_LEAVES = 256, MAX_TILES = 64 };
 
 static int encode(tree_job *j, const txm_image *image, const char *kind, int s, picture *p) {
     const char *why;
-    if (!image_encode(NULL, ".png", image, &p->png, &p->size, &why))
+    image_job job = {0};
+    job.env = &j->run.env;
+    if (!image_encode(&job, ".png", image, &p->png, &p->size, &why))
         return cli_fail(&j->run, CLI_FAILED, "cannot write '%s': %s", j->run.output, why);
     p->width = image->width;
     if (s == 0) snprintf(p->name, sizeof p->name, "%s", kind);
