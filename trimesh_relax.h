@@ -2205,6 +2205,9 @@ typedef struct tmr_walk {
     int32_t face[TMR_WALK_MOST];
     double way[TMR_WALK_MOST + 1];
     txm_dvec3 point[TMR_WALK_MOST + 1];
+    int32_t corner;  /* of the next face, opposite to the edge by which it is entered              */
+    txm_dvec3 a, b;  /* the ends of that edge: at the next corner and at the previous one          */
+    txm_dvec3 d;     /* the direction in the next face, unit                                       */
 } tmr_walk;
 
 /* A strip as a walk has seen it. */
@@ -2223,59 +2226,59 @@ static double tmr_chord(const tmr_surface *s, int32_t f, int32_t g) {
     return txm_d3_dist(s->normal[f], s->normal[g]);
 }
 
-/* Walk from the middle of the edge opposite to corner c into its face and on, until way >= reach.
-   Returns 0 if that leads over too many faces, or over one without area. */
-static int tmr_walk_across(const tmr_surface *s, int32_t c, double reach, tmr_walk *walk) {
-    txm_dvec3 a = s->point[s->vertex[tmr_next(c)]], b = s->point[s->vertex[tmr_prev(c)]];
-    txm_dvec3 p = txm_d3_scale(txm_d3_add(a, b), 0.5), along = txm_d3_unit(txm_d3_sub(b, a));
-    txm_dvec3 d = txm_d3_cross(s->normal[c / 3], along);
+/* Begin in the middle of the edge opposite to corner c, at right angles to it. */
+static void tmr_walk_begin(const tmr_surface *s, int32_t c, tmr_walk *walk) {
     walk->count = walk->border = 0;
+    walk->corner = c;
+    walk->a = s->point[s->vertex[tmr_next(c)]];
+    walk->b = s->point[s->vertex[tmr_prev(c)]];
+    walk->d = txm_d3_cross(s->normal[c / 3], txm_d3_unit(txm_d3_sub(walk->b, walk->a)));
     walk->way[0] = 0;
-    walk->point[0] = p;
-    while (walk->count < TMR_WALK_MOST) {
-        const txm_dvec3 n = s->normal[c / 3];
-        int32_t exit = -1;
-        double least = 0, cosine = 0;
-        for (int side = 0; side < 2; side++) {
-            const int32_t k = side ? tmr_prev(c) : tmr_next(c);
-            a = s->point[s->vertex[tmr_next(k)]];
-            b = s->point[s->vertex[tmr_prev(k)]];
-            const txm_dvec3 e = txm_d3_unit(txm_d3_sub(b, a)), out = txm_d3_cross(e, n);
-            const double speed = txm_d3_dot(d, out);
-            if (!(speed > 1e-9)) continue;
-            const double t = fmax(0, txm_d3_dot(txm_d3_sub(a, p), out) / speed);
-            if (exit >= 0 && t >= least) continue;
-            exit = k;
-            least = t;
-            along = e;
-            cosine = txm_d3_dot(d, e);
-        }
-        if (exit < 0) return 0;
-        const int32_t i = walk->count++;
-        p = txm_d3_mad(p, d, least);
-        walk->face[i] = c / 3;
-        walk->way[i + 1] = walk->way[i] + least;
-        walk->point[i + 1] = p;
-        if (walk->way[i + 1] >= reach) return 1;
-        c = s->opposite[exit];
-        walk->border = c < 0;
-        if (walk->border) return 1;
-        /* in the next face the edge runs the other way, so that its inside lies to the right */
-        const txm_dvec3 in = txm_d3_cross(along, s->normal[c / 3]);
-        d = txm_d3_unit(txm_d3_mad(txm_d3_scale(along, cosine), in, sqrt(fmax(0, 1 - cosine * cosine))));
-    }
-    return 0;
+    walk->point[0] = txm_d3_scale(txm_d3_add(walk->a, walk->b), 0.5);
 }
 
-/* Where does the walk reach a flat? *first receives the number of its first face there, *flat that
-   of its longest one. Returns 0 if it does not. */
-static int tmr_find_flat(const tmr_surface *s, const tmr_walk *walk, double least, int32_t *first,
-                         int32_t *flat) {
+/* Cross the next face, not after the border.
+
+            q           The walk comes in between a and b, and leaves between b and q if q lies to its
+           / \          left, else between q and a.
+          /   \
+         b--^--a        Returns 0 if it has crossed too many faces, or if this one has no area.  */
+static int tmr_walk_on(const tmr_surface *s, tmr_walk *walk) {
+    const int32_t i = walk->count, c = walk->corner;
+    if (i >= TMR_WALK_MOST) return 0;
+    const txm_dvec3 n = s->normal[c / 3], p = walk->point[i], d = walk->d, q = s->point[s->vertex[c]];
+    const int left = txm_d3_dot(n, txm_d3_cross(d, txm_d3_sub(q, p))) > 0;
+    const int32_t exit = left ? tmr_next(c) : tmr_prev(c);
+    if (left) walk->a = q; /* seen from the next face */
+    else walk->b = q;
+    const txm_dvec3 e = txm_d3_unit(txm_d3_sub(walk->a, walk->b)), out = txm_d3_cross(e, n);
+    const double speed = txm_d3_dot(d, out), cosine = txm_d3_dot(d, e);
+    if (!(speed > 1e-9)) return 0;
+    const double t = fmax(0, txm_d3_dot(txm_d3_sub(q, p), out) / speed);
+    walk->face[i] = c / 3;
+    walk->way[i + 1] = walk->way[i] + t;
+    walk->point[i + 1] = txm_d3_mad(p, d, t);
+    walk->count++;
+    walk->corner = s->opposite[exit];
+    walk->border = walk->corner < 0;
+    if (walk->border) return 1;
+    /* in the next face the edge runs the other way, so that its inside lies to the right */
+    const txm_dvec3 in = txm_d3_cross(e, s->normal[walk->corner / 3]);
+    walk->d = txm_d3_unit(txm_d3_mad(txm_d3_scale(e, cosine), in, sqrt(fmax(0, 1 - cosine * cosine))));
+    return 1;
+}
+
+/* Walk from the edge opposite to corner c until a flat that is at least that wide is reached, but no
+   farther than reach. *first receives the number of its first face, *flat that of its longest one.
+   Returns 0 if there is none. */
+static int tmr_walk_to_flat(const tmr_surface *s, int32_t c, double reach, double least, tmr_walk *walk,
+                            int32_t *first, int32_t *flat) {
     int32_t from = 0;
-    for (int32_t i = 0; i < walk->count; i++) {
+    tmr_walk_begin(s, c, walk);
+    while (!walk->border && walk->way[walk->count] < reach && tmr_walk_on(s, walk)) {
+        const int32_t i = walk->count - 1;
         while (tmr_chord(s, walk->face[from], walk->face[i]) > TMR_BAND_BENT) from++;
-        const int at_border = walk->border && i == walk->count - 1;
-        if (walk->way[i + 1] - walk->way[from] < least && !at_border) continue;
+        if (walk->way[i + 1] - walk->way[from] < least && !walk->border) continue;
         *flat = from;
         for (int32_t k = from; k <= i; k++)
             if (walk->way[k + 1] - walk->way[k] > walk->way[*flat + 1] - walk->way[*flat]) *flat = k;
@@ -2404,8 +2407,7 @@ static int tmr_turns_fast(const tmr_surface *s, int32_t c, double sharp, double 
 static int tmr_is_beside_flat(const tmr_surface *s, int32_t c, double least) {
     tmr_walk walk;
     int32_t first, flat;
-    return tmr_walk_across(s, c, least, &walk) && tmr_find_flat(s, &walk, least, &first, &flat) &&
-           first == 0;
+    return tmr_walk_to_flat(s, c, least, least, &walk, &first, &flat) && first == 0;
 }
 
 /* Is the edge opposite to corner c part of a strip? sharp: the turn that makes a crease, as
@@ -2421,9 +2423,8 @@ static int tmr_band_at(const tmr_surface *s, int32_t c, double sharp, double spa
     const double reach = (TMR_BAND_WIDTH + TMR_BAND_FLAT) * spacing, least = TMR_BAND_FLAT * spacing;
     if (tmr_is_beside_flat(s, c, least) && tmr_is_beside_flat(s, s->opposite[c], least))
         return 0; /* the usual case, seen from near */
-    if (!tmr_walk_across(s, c, reach, &left) || !tmr_find_flat(s, &left, least, first, flat)) return 0;
-    if (!tmr_walk_across(s, s->opposite[c], reach, &right) ||
-        !tmr_find_flat(s, &right, least, first + 1, flat + 1))
+    if (!tmr_walk_to_flat(s, c, reach, least, &left, first, flat) ||
+        !tmr_walk_to_flat(s, s->opposite[c], reach, least, &right, first + 1, flat + 1))
         return 0;
     tmr_join_walks(&left, first[0], flat[0], &right, first[1], flat[1], &profile);
     int32_t low = 0, high = profile.count - 1;
@@ -2434,10 +2435,11 @@ static int tmr_band_at(const tmr_surface *s, int32_t c, double sharp, double spa
 /* How wide is the flat that begins at the edge opposite to corner c, on its side? */
 static double tmr_flat_width(const tmr_surface *s, int32_t c) {
     tmr_walk walk;
-    int32_t i = 0;
-    tmr_walk_across(s, c, 1e30, &walk); /* to the border, or as far as a walk goes */
-    while (i < walk.count && tmr_chord(s, walk.face[0], walk.face[i]) <= TMR_BAND_BENT) i++;
-    return walk.way[i];
+    tmr_walk_begin(s, c, &walk); /* to the border, or as far as a walk goes */
+    while (!walk.border && tmr_walk_on(s, &walk))
+        if (tmr_chord(s, c / 3, walk.face[walk.count - 1]) > TMR_BAND_BENT)
+            return walk.way[walk.count - 1];
+    return walk.way[walk.count];
 }
 
 /* Is the edge opposite to corner c one of a part, between two flats? They begin there on both sides. A
@@ -3871,6 +3873,7 @@ typedef struct tmr_ridges {
     txm_env *env;
     double sharp, spacing;
     uint8_t *strip;     /* 1 per face: part of a strip                                            */
+    uint8_t *seen;      /* 1 per face: bit k: a strip was seen from the edge opposite to its corner k */
     int32_t *component; /* 1 per face: of a connected strip, its first face                       */
     float *length;      /* 1 per face: its part of the length of the strip                        */
     float (*section)[2]; /* 1 per face: sum of the cross-sections that walks have seen, how many   */
@@ -3924,6 +3927,7 @@ static txm_status tmr_mark_strips(tmr_ridges *r, size_t *found) {
             txm_d3_dist(s->point[s->vertex[tmr_next(c)]], s->point[s->vertex[tmr_prev(c)]]);
         const double turn = tmr_chord(s, c / 3, s->opposite[c] / 3);
         const double whole = txm_d3_dist(band.normal[0], band.normal[1]);
+        r->seen[c / 3] |= (uint8_t)(1 << c % 3);
         for (int32_t i = 0; i < band.count; i++) r->strip[band.face[i]] = 1;
         r->length[band.face[0]] += txm_float(length * turn / whole);
         ++*found;
@@ -3937,15 +3941,16 @@ static int tmr_is_strip_corner(const tmr_ridges *r, const uint8_t *at_strip, int
     const tmr_surface *s = r->s;
     const int32_t *v = s->vertex + 3 * f;
     const double spacing = tmr_spacing_at(s, 3 * f, r->spacing), most = TMR_BAND_SHIFT * spacing;
-    int turns = 0, fast = 0, beside = 0;
+    int turns = 0, fast = 0;
+    const int beside = at_strip[v[0]] + at_strip[v[1]] + at_strip[v[2]];
+    if (beside < 2) return 0;
     for (int k = 0; k < 3; k++) {
         if (txm_d3_dist2(s->point[v[k]], s->point[v[(k + 1) % 3]]) > most * most) return 0;
-        beside += at_strip[v[k]];
         const int32_t o = s->opposite[3 * f + k];
         turns += o >= 0 && tmr_chord(s, f, o / 3) > TMR_BAND_SAME;
         fast += tmr_turns_fast(s, 3 * f + k, r->sharp, spacing);
     }
-    return turns >= 2 && fast >= 1 && beside >= 2;
+    return turns >= 2 && fast >= 1;
 }
 
 /* Add the faces of corners to the strips that meet there, from the rim inwards. at_strip: scratch,
@@ -4124,7 +4129,7 @@ static txm_status tmr_collect_planes(tmr_ridges *r, txm_arena *scratch) {
     }
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t o = s->opposite[c];
-        if (o < 0 || (!r->strip[c / 3] && !r->strip[o / 3])) continue;
+        if (!(r->seen[c / 3] >> c % 3 & 1) || (!r->strip[c / 3] && !r->strip[o / 3])) continue;
         if (!tmr_band_at(s, c, r->sharp, r->spacing, &band)) continue;
         if (r->strip[band.flat[0]] || r->strip[band.flat[1]]) continue;
         if (!tmr_is_cross_section(s, c, &band)) continue;
@@ -4377,8 +4382,9 @@ static txm_status tmr_make_ridges(tmr_surface *s, double angle, double spacing, 
     r.spacing = spacing;
     r.sharp = sqrt(2 - 2 * txm_cos(angle * (TXM_PI / 180)));
     r.strip = (uint8_t *)txm_arena_zero(scratch, faces, 1);
+    r.seen = (uint8_t *)txm_arena_zero(scratch, faces, 1);
     r.length = (float *)txm_arena_zero(scratch, faces, sizeof(float));
-    if (!r.strip || !r.length) return TXM_OUT_OF_MEMORY;
+    if (!r.strip || !r.seen || !r.length) return TXM_OUT_OF_MEMORY;
     txm_status status = tmr_mark_strips(&r, &found);
     if (status != TXM_OK || found == 0) return status;
     int32_t *queue = (int32_t *)txm_arena_alloc(scratch, faces, sizeof(int32_t));

@@ -46,6 +46,7 @@ typedef struct tmr_ridges {
     txm_env *env;
     double sharp, spacing;
     uint8_t *strip;     /* 1 per face: part of a strip                                            */
+    uint8_t *seen;      /* 1 per face: bit k: a strip was seen from the edge opposite to its corner k */
     int32_t *component; /* 1 per face: of a connected strip, its first face                       */
     float *length;      /* 1 per face: its part of the length of the strip                        */
     float (*section)[2]; /* 1 per face: sum of the cross-sections that walks have seen, how many   */
@@ -99,6 +100,7 @@ static txm_status tmr_mark_strips(tmr_ridges *r, size_t *found) {
             txm_d3_dist(s->point[s->vertex[tmr_next(c)]], s->point[s->vertex[tmr_prev(c)]]);
         const double turn = tmr_chord(s, c / 3, s->opposite[c] / 3);
         const double whole = txm_d3_dist(band.normal[0], band.normal[1]);
+        r->seen[c / 3] |= (uint8_t)(1 << c % 3);
         for (int32_t i = 0; i < band.count; i++) r->strip[band.face[i]] = 1;
         r->length[band.face[0]] += txm_float(length * turn / whole);
         ++*found;
@@ -112,15 +114,16 @@ static int tmr_is_strip_corner(const tmr_ridges *r, const uint8_t *at_strip, int
     const tmr_surface *s = r->s;
     const int32_t *v = s->vertex + 3 * f;
     const double spacing = tmr_spacing_at(s, 3 * f, r->spacing), most = TMR_BAND_SHIFT * spacing;
-    int turns = 0, fast = 0, beside = 0;
+    int turns = 0, fast = 0;
+    const int beside = at_strip[v[0]] + at_strip[v[1]] + at_strip[v[2]];
+    if (beside < 2) return 0;
     for (int k = 0; k < 3; k++) {
         if (txm_d3_dist2(s->point[v[k]], s->point[v[(k + 1) % 3]]) > most * most) return 0;
-        beside += at_strip[v[k]];
         const int32_t o = s->opposite[3 * f + k];
         turns += o >= 0 && tmr_chord(s, f, o / 3) > TMR_BAND_SAME;
         fast += tmr_turns_fast(s, 3 * f + k, r->sharp, spacing);
     }
-    return turns >= 2 && fast >= 1 && beside >= 2;
+    return turns >= 2 && fast >= 1;
 }
 
 /* Add the faces of corners to the strips that meet there, from the rim inwards. at_strip: scratch,
@@ -299,7 +302,7 @@ static txm_status tmr_collect_planes(tmr_ridges *r, txm_arena *scratch) {
     }
     for (int32_t c = 0; c < 3 * s->face_count; c++) {
         const int32_t o = s->opposite[c];
-        if (o < 0 || (!r->strip[c / 3] && !r->strip[o / 3])) continue;
+        if (!(r->seen[c / 3] >> c % 3 & 1) || (!r->strip[c / 3] && !r->strip[o / 3])) continue;
         if (!tmr_band_at(s, c, r->sharp, r->spacing, &band)) continue;
         if (r->strip[band.flat[0]] || r->strip[band.flat[1]]) continue;
         if (!tmr_is_cross_section(s, c, &band)) continue;
@@ -552,8 +555,9 @@ static txm_status tmr_make_ridges(tmr_surface *s, double angle, double spacing, 
     r.spacing = spacing;
     r.sharp = sqrt(2 - 2 * txm_cos(angle * (TXM_PI / 180)));
     r.strip = (uint8_t *)txm_arena_zero(scratch, faces, 1);
+    r.seen = (uint8_t *)txm_arena_zero(scratch, faces, 1);
     r.length = (float *)txm_arena_zero(scratch, faces, sizeof(float));
-    if (!r.strip || !r.length) return TXM_OUT_OF_MEMORY;
+    if (!r.strip || !r.seen || !r.length) return TXM_OUT_OF_MEMORY;
     txm_status status = tmr_mark_strips(&r, &found);
     if (status != TXM_OK || found == 0) return status;
     int32_t *queue = (int32_t *)txm_arena_alloc(scratch, faces, sizeof(int32_t));
