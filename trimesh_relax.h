@@ -364,6 +364,9 @@ typedef struct tmr_surface {
     int32_t component_count;
     int32_t loop_count;     /* border loops                                                     */
     int32_t border_count;   /* border edges: corners whose opposite is -1                       */
+    int32_t *fan;           /* NULL, or 1 per vertex: where in spoke its fan begins, -1 = it is small */
+    int32_t *spoke;         /* of each large fan the number of its corners, then they, counter-
+                               clockwise: place.h                                              */
     uint32_t *origin;       /* 1 per face: the caller's triangle                                */
     uint8_t *turn;          /* 1 per face: how its corners map to the caller's: corner k is the
                                caller's corner (k + turn) % 3, or (turn - k + 3) % 3 with turn
@@ -3521,25 +3524,109 @@ static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, txm_dvec3 p) {
     return at;
 }
 
+/* ---- large fans ---------------------------------------------------------------------------- */
+
+/* Where many faces meet in one vertex, as in the tip of a cone, or in the corner opposite to a side
+   with many T-junctions, looking at all of them takes most of the time. So the corners of such fans
+   are listed, and searched from coarse to fine. */
+enum {
+    TMR_FAN_SMALL = 48,   /* ours: all faces of fans up to so many are looked at                  */
+    TMR_FAN_SAMPLES = 16, /* ours: of a large one so many first,                                  */
+    TMR_FAN_FINER = 4     /* ours: then in steps of this part, around the best                    */
+};
+
+/* List the large fans in s->fan and s->spoke. */
+static txm_status tmr_find_fans(tmr_surface *s, txm_arena *arena, txm_arena *scratch) {
+    const size_t n = (size_t)s->vertex_count;
+    size_t total = 0;
+    s->fan = s->spoke = NULL;
+    int32_t *valence = (int32_t *)txm_arena_zero(scratch, n, sizeof(int32_t));
+    if (!valence) return TXM_OUT_OF_MEMORY;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) valence[s->vertex[c]]++;
+    for (size_t v = 0; v < n; v++)
+        if (valence[v] > TMR_FAN_SMALL) total += (size_t)valence[v] + 1;
+    if (total == 0 || total > INT32_MAX) return TXM_OK; /* too many to number: slow, but as good */
+    s->fan = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    s->spoke = (int32_t *)txm_arena_alloc(arena, total, sizeof(int32_t));
+    if (!s->fan || !s->spoke) return TXM_OUT_OF_MEMORY;
+    size_t at = 0;
+    for (int32_t v = 0; v < s->vertex_count; v++) {
+        const int32_t first = s->corner[v];
+        s->fan[v] = -1;
+        if (valence[v] <= TMR_FAN_SMALL) continue;
+        s->fan[v] = (int32_t)at;
+        s->spoke[at++] = valence[v];
+        int32_t c = first;
+        do { /* each vertex has one fan */
+            TRIMESH_ASSERT(at < total && c >= 0);
+            s->spoke[at++] = c;
+            c = tmr_ccw(s->opposite, c);
+        } while (c >= 0 && c != first);
+        TRIMESH_ASSERT(at == (size_t)s->fan[v] + 1 + (size_t)valence[v]);
+    }
+    return TXM_OK;
+}
+
+/* The place nearest to p in the faces of vertex v, or in a large fan about that. */
+static tmr_place tmr_on_fan(const tmr_surface *s, int32_t v, txm_dvec3 p) {
+    if (!s->fan || s->fan[v] < 0) {
+        const int32_t first = s->corner[v];
+        tmr_place best = tmr_on_face(s, first / 3, p);
+        for (int32_t c = tmr_ccw(s->opposite, first); c >= 0 && c != first; c = tmr_ccw(s->opposite, c)) {
+            const tmr_place there = tmr_on_face(s, c / 3, p);
+            if (there.d2 < best.d2) best = there;
+        }
+        return best;
+    }
+    const int32_t n = s->spoke[s->fan[v]], *spoke = s->spoke + s->fan[v] + 1;
+    int32_t step = (n + TMR_FAN_SAMPLES - 1) / TMR_FAN_SAMPLES, k = 0;
+    tmr_place best = tmr_on_face(s, spoke[0] / 3, p);
+    for (int32_t i = step; i < n; i += step) {
+        const tmr_place there = tmr_on_face(s, spoke[i] / 3, p);
+        if (there.d2 < best.d2) {
+            best = there;
+            k = i;
+        }
+    }
+    while (step > 1) {
+        const int32_t middle = k, reach = step;
+        step = (step + TMR_FAN_FINER - 1) / TMR_FAN_FINER;
+        for (int32_t i = -reach + step; i < reach; i += step) {
+            const int32_t j = (middle + i + n) % n; /* across the border that is just another one */
+            const tmr_place there = tmr_on_face(s, spoke[j] / 3, p);
+            if (there.d2 < best.d2) {
+                best = there;
+                k = j;
+            }
+        }
+    }
+    return best;
+}
+
+/* ---- projecting ---------------------------------------------------------------------------- */
+
 /* The place on the surface nearest to p, found by walking from a face while the distance falls:
-   takes time proportional to the way, and cannot jump to another sheet. */
+   takes time proportional to the way, and cannot jump to another sheet. Large fans are crossed at
+   once. */
 static tmr_place tmr_project(const tmr_surface *s, txm_dvec3 p, int32_t face) {
+    int32_t crossed = -1; /* the last large fan */
     tmr_place at = tmr_on_face(s, face, p);
     for (int guard = 0; guard < 4096 && at.part != 0; guard++) {
         tmr_place best = at;
         if (at.part <= 3) {
             const int32_t o = s->opposite[3 * at.face + at.part - 1];
             if (o >= 0) best = tmr_on_face(s, o / 3, p);
-        } else {
-            const int32_t first = s->corner[s->vertex[3 * at.face + at.part - 4]];
-            int32_t c = first;
-            do {
-                const tmr_place there = c / 3 == at.face ? at : tmr_on_face(s, c / 3, p);
+            for (int k = 0; k < 3 && s->fan; k++) {
+                const int32_t v = s->vertex[3 * at.face + k];
+                if (k == at.part - 1 || v == crossed || s->fan[v] < 0) continue;
+                const tmr_place there = tmr_on_fan(s, v, p);
                 if (there.d2 < best.d2) best = there;
-                const int32_t o = s->opposite[tmr_next(c)];
-                if (o < 0) break;
-                c = tmr_next(o);
-            } while (c != first);
+                crossed = v;
+            }
+        } else {
+            const int32_t v = s->vertex[3 * at.face + at.part - 4];
+            const tmr_place there = tmr_on_fan(s, v, p);
+            if (there.d2 < best.d2) best = there;
         }
         if (best.face == at.face || !(best.d2 < at.d2 * (1 - 1e-12))) break;
         at = best;
@@ -3590,6 +3677,7 @@ typedef struct tmr_work {
     uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
+    int splinters;     /* of collapsing: also the short sides of much longer triangles          */
 } tmr_work;
 
 /* a face of the surface at the vertex */
@@ -3638,6 +3726,10 @@ static tmr_place tmr_project_from(const tmr_work *w, int32_t v, txm_dvec3 p) {
     tmr_place at = tmr_project(s, p, tmr_face_of(w, v));
     if (kind == TRIMESH_CORNER) {
         const int32_t first = s->corner[k];
+        if (s->fan && s->fan[k] >= 0) {
+            const tmr_place other = tmr_project(s, p, tmr_on_fan(s, k, p).face);
+            return other.d2 < at.d2 ? other : at;
+        }
         for (int32_t c = tmr_ccw(s->opposite, first); c >= 0 && c != first; c = tmr_ccw(s->opposite, c)) {
             const tmr_place other = tmr_project(s, p, c / 3);
             if (other.d2 < at.d2) at = other;
@@ -3687,6 +3779,8 @@ static txm_dvec3 tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, in
     return w->s->normal[tmr_below_middle(w, v).face];
 }
 
+#define TMR_THIN 0.02 /* twice the area over the squared longest edge of a triangle without a direction */
+
 /* how well a triangle at these points agrees with the normals of its vertices: -1..1, -1 also for
    one without area */
 static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, txm_dvec3 pa,
@@ -3695,7 +3789,7 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
     const double length = txm_d3_len(n);
     const double longest =
         fmax(txm_d3_dist2(pa, pb), fmax(txm_d3_dist2(pb, pc), txm_d3_dist2(pc, pa)));
-    if (length <= 0.02 * longest) return -1;
+    if (length <= TMR_THIN * longest) return -1;
     return txm_d3_dot(n, tmr_expected_normal(w, a, b, c)) / length;
 }
 
@@ -4849,11 +4943,32 @@ static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
            !tmr_is_ghost(m, m->vertex[tmr_prev(c)]);
 }
 
+#define TMR_SPLINTER 0.02 /* ours: shortest over longest edge of triangles whose short side is merged
+                             however long the others are: split, they would fill the mesh,     */
+#define TMR_SPLINTER_BEND 0.05 /* ours: if that turns them by no more than this                 */
+
+/* Does moving its corner from p to `to` leave the triangle p x y in its plane? */
+static int tmr_stays_flat(txm_dvec3 p, txm_dvec3 to, txm_dvec3 x, txm_dvec3 y) {
+    const txm_dvec3 n = txm_d3_area2(p, x, y), way = txm_d3_sub(to, p);
+    const double off = txm_d3_dot(n, way);
+    return off * off <= TMR_SPLINTER_BEND * TMR_SPLINTER_BEND * txm_d3_len2(n) * txm_d3_len2(way);
+}
+
+/* Does that make it, too thin to agree with anything, no thinner, without turning it over? */
+static int tmr_widens_thin(txm_dvec3 p, txm_dvec3 to, txm_dvec3 x, txm_dvec3 y) {
+    const txm_dvec3 before = txm_d3_area2(p, x, y), after = txm_d3_area2(to, x, y);
+    const double longest2 = fmax(txm_d3_dist2(p, x), fmax(txm_d3_dist2(x, y), txm_d3_dist2(y, p)));
+    return txm_d3_len(before) <= TMR_THIN * longest2 &&
+           txm_d3_dot(before, after) > 0.9 * txm_d3_len2(before);
+}
+
 /* Would all triangles of b be fair after b is merged into a at position to? reach: no edge may
-   become longer than this, relative to the wanted length; 0 = any. */
+   become longer than this, relative to the wanted length, but with w->splinters for those of
+   splinters, which are longer already; 0 = any. */
 static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, double reach) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
+    const double merged2 = txm_d3_dist2(m->p[m->vertex[tmr_next(c)]], m->p[m->vertex[tmr_prev(c)]]);
     for (int end = 0; end < 2; end++) {
         const int32_t first = end ? tmr_next(c) : tmr_prev(c), v = m->vertex[first];
         if (end && txm_d3_dist2(m->p[v], to) <= 0) break; /* a stays */
@@ -4862,13 +4977,18 @@ static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, doub
             const int32_t x = m->vertex[tmr_next(i)], y = m->vertex[tmr_prev(i)];
             if (i / 3 != c / 3 && i / 3 != o / 3 && !tmr_is_ghost(m, x) && !tmr_is_ghost(m, y)) {
                 const double after = tmr_agreement(w, v, x, y, to, m->p[x], m->p[y]);
-                if (after < TMR_LEAST_AGREEMENT &&
+                const double wanted = w->length * 0.5 * (w->size[v] + (double)w->size[x]);
+                const double most2 = reach * reach * wanted * wanted;
+                const double vx2 = txm_d3_dist2(m->p[v], m->p[x]), vy2 = txm_d3_dist2(m->p[v], m->p[y]);
+                const double long2 = fmax(most2, merged2 / (TMR_SPLINTER * TMR_SPLINTER));
+                const int splinter = w->splinters && fmax(vx2, vy2) > long2 &&
+                                     tmr_stays_flat(m->p[v], to, m->p[x], m->p[y]);
+                const int longer = splinter && vx2 > long2;
+                const int thin = splinter && tmr_widens_thin(m->p[v], to, m->p[x], m->p[y]);
+                if (after < TMR_LEAST_AGREEMENT && !thin &&
                     after <= tmr_agreement(w, v, x, y, m->p[v], m->p[x], m->p[y]))
                     return 0;
-                if (reach > 0) {
-                    const double wanted = w->length * 0.5 * (w->size[v] + (double)w->size[x]);
-                    if (txm_d3_dist2(to, m->p[x]) > reach * reach * wanted * wanted) return 0;
-                }
+                if (reach > 0 && !longer && txm_d3_dist2(to, m->p[x]) > most2) return 0;
             }
             i = tmr_swing(m, i);
         } while (i != first);
@@ -5694,10 +5814,13 @@ static txm_status tmr_resample(tmr_work *w) {
     const double aim = sqrt(0.5); /* of edges, relative to w->length */
     /* lines first: the inside is then split to fit them */
     tmr_split_long(w, 1e9, 1.0);
-    /* fine input: collapse edges, the shortest first */
+    /* fine input: collapse edges, the shortest first, in one direction too: a fan over a side with a
+       thousand vertices consists of splinters */
     double limit = 0.05 * aim;
     while (limit < 0.72 * aim) {
+        w->splinters = 1;
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
+        w->splinters = 0;
         limit *= 1.5;
         if (txm_progress(w->env, 0, "resample")) return TXM_CANCELLED;
     }
@@ -8130,6 +8253,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
         status = tmr_make_ridges(&job->s, angle, tmr_job_spacing(job), &job->env, &job->input,
                                  &job->scratch);
     if (status == TXM_OK) status = tmr_job_lines(job, angle);
+    if (status == TXM_OK) status = tmr_find_fans(&job->s, &job->input, &job->scratch);
     if (status != TXM_OK) return status;
     job->w.s = &job->s;
     job->w.l = &job->l;
@@ -9177,6 +9301,7 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     if (status == TXM_OK)
         status = tmr_settle_lines(&u->s, &u->desc, (double)desc.vertices, angle, length, &u->input,
                                   &u->scratch, report, &u->l, &least);
+    if (status == TXM_OK) status = tmr_find_fans(&u->s, &u->input, &u->scratch);
     if (status != TXM_OK) return status;
     u->w.desc = &u->desc;
     u->w.s = &u->s;

@@ -17,11 +17,32 @@ static int tmr_is_real_edge(const tmr_mesh *m, int32_t c) {
            !tmr_is_ghost(m, m->vertex[tmr_prev(c)]);
 }
 
+#define TMR_SPLINTER 0.02 /* ours: shortest over longest edge of triangles whose short side is merged
+                             however long the others are: split, they would fill the mesh,     */
+#define TMR_SPLINTER_BEND 0.05 /* ours: if that turns them by no more than this                 */
+
+/* Does moving its corner from p to `to` leave the triangle p x y in its plane? */
+static int tmr_stays_flat(txm_dvec3 p, txm_dvec3 to, txm_dvec3 x, txm_dvec3 y) {
+    const txm_dvec3 n = txm_d3_area2(p, x, y), way = txm_d3_sub(to, p);
+    const double off = txm_d3_dot(n, way);
+    return off * off <= TMR_SPLINTER_BEND * TMR_SPLINTER_BEND * txm_d3_len2(n) * txm_d3_len2(way);
+}
+
+/* Does that make it, too thin to agree with anything, no thinner, without turning it over? */
+static int tmr_widens_thin(txm_dvec3 p, txm_dvec3 to, txm_dvec3 x, txm_dvec3 y) {
+    const txm_dvec3 before = txm_d3_area2(p, x, y), after = txm_d3_area2(to, x, y);
+    const double longest2 = fmax(txm_d3_dist2(p, x), fmax(txm_d3_dist2(x, y), txm_d3_dist2(y, p)));
+    return txm_d3_len(before) <= TMR_THIN * longest2 &&
+           txm_d3_dot(before, after) > 0.9 * txm_d3_len2(before);
+}
+
 /* Would all triangles of b be fair after b is merged into a at position to? reach: no edge may
-   become longer than this, relative to the wanted length; 0 = any. */
+   become longer than this, relative to the wanted length, but with w->splinters for those of
+   splinters, which are longer already; 0 = any. */
 static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, double reach) {
     const tmr_mesh *m = &w->m;
     const int32_t o = m->opposite[c];
+    const double merged2 = txm_d3_dist2(m->p[m->vertex[tmr_next(c)]], m->p[m->vertex[tmr_prev(c)]]);
     for (int end = 0; end < 2; end++) {
         const int32_t first = end ? tmr_next(c) : tmr_prev(c), v = m->vertex[first];
         if (end && txm_d3_dist2(m->p[v], to) <= 0) break; /* a stays */
@@ -30,13 +51,18 @@ static int tmr_collapse_is_fair(const tmr_work *w, int32_t c, txm_dvec3 to, doub
             const int32_t x = m->vertex[tmr_next(i)], y = m->vertex[tmr_prev(i)];
             if (i / 3 != c / 3 && i / 3 != o / 3 && !tmr_is_ghost(m, x) && !tmr_is_ghost(m, y)) {
                 const double after = tmr_agreement(w, v, x, y, to, m->p[x], m->p[y]);
-                if (after < TMR_LEAST_AGREEMENT &&
+                const double wanted = w->length * 0.5 * (w->size[v] + (double)w->size[x]);
+                const double most2 = reach * reach * wanted * wanted;
+                const double vx2 = txm_d3_dist2(m->p[v], m->p[x]), vy2 = txm_d3_dist2(m->p[v], m->p[y]);
+                const double long2 = fmax(most2, merged2 / (TMR_SPLINTER * TMR_SPLINTER));
+                const int splinter = w->splinters && fmax(vx2, vy2) > long2 &&
+                                     tmr_stays_flat(m->p[v], to, m->p[x], m->p[y]);
+                const int longer = splinter && vx2 > long2;
+                const int thin = splinter && tmr_widens_thin(m->p[v], to, m->p[x], m->p[y]);
+                if (after < TMR_LEAST_AGREEMENT && !thin &&
                     after <= tmr_agreement(w, v, x, y, m->p[v], m->p[x], m->p[y]))
                     return 0;
-                if (reach > 0) {
-                    const double wanted = w->length * 0.5 * (w->size[v] + (double)w->size[x]);
-                    if (txm_d3_dist2(to, m->p[x]) > reach * reach * wanted * wanted) return 0;
-                }
+                if (reach > 0 && !longer && txm_d3_dist2(to, m->p[x]) > most2) return 0;
             }
             i = tmr_swing(m, i);
         } while (i != first);

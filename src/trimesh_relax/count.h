@@ -104,10 +104,13 @@ static txm_status tmr_resample(tmr_work *w) {
     const double aim = sqrt(0.5); /* of edges, relative to w->length */
     /* lines first: the inside is then split to fit them */
     tmr_split_long(w, 1e9, 1.0);
-    /* fine input: collapse edges, the shortest first */
+    /* fine input: collapse edges, the shortest first, in one direction too: a fan over a side with a
+       thousand vertices consists of splinters */
     double limit = 0.05 * aim;
     while (limit < 0.72 * aim) {
+        w->splinters = 1;
         tmr_collapse_short(w, limit, limit * 1.2, 1.4 * aim, 0);
+        w->splinters = 0;
         limit *= 1.5;
         if (txm_progress(w->env, 0, "resample")) return TXM_CANCELLED;
     }

@@ -109,6 +109,7 @@ static txm_status tmr_job_mend(trimesh_job *job) {
         status = tmr_make_ridges(&job->s, angle, tmr_job_spacing(job), &job->env, &job->input,
                                  &job->scratch);
     if (status == TXM_OK) status = tmr_job_lines(job, angle);
+    if (status == TXM_OK) status = tmr_find_fans(&job->s, &job->input, &job->scratch);
     if (status != TXM_OK) return status;
     job->w.s = &job->s;
     job->w.l = &job->l;

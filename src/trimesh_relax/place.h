@@ -69,25 +69,109 @@ static tmr_place tmr_on_face(const tmr_surface *s, int32_t face, txm_dvec3 p) {
     return at;
 }
 
+/* ---- large fans ---------------------------------------------------------------------------- */
+
+/* Where many faces meet in one vertex, as in the tip of a cone, or in the corner opposite to a side
+   with many T-junctions, looking at all of them takes most of the time. So the corners of such fans
+   are listed, and searched from coarse to fine. */
+enum {
+    TMR_FAN_SMALL = 48,   /* ours: all faces of fans up to so many are looked at                  */
+    TMR_FAN_SAMPLES = 16, /* ours: of a large one so many first,                                  */
+    TMR_FAN_FINER = 4     /* ours: then in steps of this part, around the best                    */
+};
+
+/* List the large fans in s->fan and s->spoke. */
+static txm_status tmr_find_fans(tmr_surface *s, txm_arena *arena, txm_arena *scratch) {
+    const size_t n = (size_t)s->vertex_count;
+    size_t total = 0;
+    s->fan = s->spoke = NULL;
+    int32_t *valence = (int32_t *)txm_arena_zero(scratch, n, sizeof(int32_t));
+    if (!valence) return TXM_OUT_OF_MEMORY;
+    for (int32_t c = 0; c < 3 * s->face_count; c++) valence[s->vertex[c]]++;
+    for (size_t v = 0; v < n; v++)
+        if (valence[v] > TMR_FAN_SMALL) total += (size_t)valence[v] + 1;
+    if (total == 0 || total > INT32_MAX) return TXM_OK; /* too many to number: slow, but as good */
+    s->fan = (int32_t *)txm_arena_alloc(arena, n, sizeof(int32_t));
+    s->spoke = (int32_t *)txm_arena_alloc(arena, total, sizeof(int32_t));
+    if (!s->fan || !s->spoke) return TXM_OUT_OF_MEMORY;
+    size_t at = 0;
+    for (int32_t v = 0; v < s->vertex_count; v++) {
+        const int32_t first = s->corner[v];
+        s->fan[v] = -1;
+        if (valence[v] <= TMR_FAN_SMALL) continue;
+        s->fan[v] = (int32_t)at;
+        s->spoke[at++] = valence[v];
+        int32_t c = first;
+        do { /* each vertex has one fan */
+            TRIMESH_ASSERT(at < total && c >= 0);
+            s->spoke[at++] = c;
+            c = tmr_ccw(s->opposite, c);
+        } while (c >= 0 && c != first);
+        TRIMESH_ASSERT(at == (size_t)s->fan[v] + 1 + (size_t)valence[v]);
+    }
+    return TXM_OK;
+}
+
+/* The place nearest to p in the faces of vertex v, or in a large fan about that. */
+static tmr_place tmr_on_fan(const tmr_surface *s, int32_t v, txm_dvec3 p) {
+    if (!s->fan || s->fan[v] < 0) {
+        const int32_t first = s->corner[v];
+        tmr_place best = tmr_on_face(s, first / 3, p);
+        for (int32_t c = tmr_ccw(s->opposite, first); c >= 0 && c != first; c = tmr_ccw(s->opposite, c)) {
+            const tmr_place there = tmr_on_face(s, c / 3, p);
+            if (there.d2 < best.d2) best = there;
+        }
+        return best;
+    }
+    const int32_t n = s->spoke[s->fan[v]], *spoke = s->spoke + s->fan[v] + 1;
+    int32_t step = (n + TMR_FAN_SAMPLES - 1) / TMR_FAN_SAMPLES, k = 0;
+    tmr_place best = tmr_on_face(s, spoke[0] / 3, p);
+    for (int32_t i = step; i < n; i += step) {
+        const tmr_place there = tmr_on_face(s, spoke[i] / 3, p);
+        if (there.d2 < best.d2) {
+            best = there;
+            k = i;
+        }
+    }
+    while (step > 1) {
+        const int32_t middle = k, reach = step;
+        step = (step + TMR_FAN_FINER - 1) / TMR_FAN_FINER;
+        for (int32_t i = -reach + step; i < reach; i += step) {
+            const int32_t j = (middle + i + n) % n; /* across the border that is just another one */
+            const tmr_place there = tmr_on_face(s, spoke[j] / 3, p);
+            if (there.d2 < best.d2) {
+                best = there;
+                k = j;
+            }
+        }
+    }
+    return best;
+}
+
+/* ---- projecting ---------------------------------------------------------------------------- */
+
 /* The place on the surface nearest to p, found by walking from a face while the distance falls:
-   takes time proportional to the way, and cannot jump to another sheet. */
+   takes time proportional to the way, and cannot jump to another sheet. Large fans are crossed at
+   once. */
 static tmr_place tmr_project(const tmr_surface *s, txm_dvec3 p, int32_t face) {
+    int32_t crossed = -1; /* the last large fan */
     tmr_place at = tmr_on_face(s, face, p);
     for (int guard = 0; guard < 4096 && at.part != 0; guard++) {
         tmr_place best = at;
         if (at.part <= 3) {
             const int32_t o = s->opposite[3 * at.face + at.part - 1];
             if (o >= 0) best = tmr_on_face(s, o / 3, p);
-        } else {
-            const int32_t first = s->corner[s->vertex[3 * at.face + at.part - 4]];
-            int32_t c = first;
-            do {
-                const tmr_place there = c / 3 == at.face ? at : tmr_on_face(s, c / 3, p);
+            for (int k = 0; k < 3 && s->fan; k++) {
+                const int32_t v = s->vertex[3 * at.face + k];
+                if (k == at.part - 1 || v == crossed || s->fan[v] < 0) continue;
+                const tmr_place there = tmr_on_fan(s, v, p);
                 if (there.d2 < best.d2) best = there;
-                const int32_t o = s->opposite[tmr_next(c)];
-                if (o < 0) break;
-                c = tmr_next(o);
-            } while (c != first);
+                crossed = v;
+            }
+        } else {
+            const int32_t v = s->vertex[3 * at.face + at.part - 4];
+            const tmr_place there = tmr_on_fan(s, v, p);
+            if (there.d2 < best.d2) best = there;
         }
         if (best.face == at.face || !(best.d2 < at.d2 * (1 - 1e-12))) break;
         at = best;

@@ -23,6 +23,9 @@ typedef struct tmr_surface {
     int32_t component_count;
     int32_t loop_count;     /* border loops                                                     */
     int32_t border_count;   /* border edges: corners whose opposite is -1                       */
+    int32_t *fan;           /* NULL, or 1 per vertex: where in spoke its fan begins, -1 = it is small */
+    int32_t *spoke;         /* of each large fan the number of its corners, then they, counter-
+                               clockwise: place.h                                              */
     uint32_t *origin;       /* 1 per face: the caller's triangle                                */
     uint8_t *turn;          /* 1 per face: how its corners map to the caller's: corner k is the
                                caller's corner (k + turn) % 3, or (turn - k + 3) % 3 with turn

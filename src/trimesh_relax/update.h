@@ -608,6 +608,7 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     if (status == TXM_OK)
         status = tmr_settle_lines(&u->s, &u->desc, (double)desc.vertices, angle, length, &u->input,
                                   &u->scratch, report, &u->l, &least);
+    if (status == TXM_OK) status = tmr_find_fans(&u->s, &u->input, &u->scratch);
     if (status != TXM_OK) return status;
     u->w.desc = &u->desc;
     u->w.s = &u->s;

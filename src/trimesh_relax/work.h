@@ -28,6 +28,7 @@ typedef struct tmr_work {
     uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
+    int splinters;     /* of collapsing: also the short sides of much longer triangles          */
 } tmr_work;
 
 /* a face of the surface at the vertex */
@@ -76,6 +77,10 @@ static tmr_place tmr_project_from(const tmr_work *w, int32_t v, txm_dvec3 p) {
     tmr_place at = tmr_project(s, p, tmr_face_of(w, v));
     if (kind == TRIMESH_CORNER) {
         const int32_t first = s->corner[k];
+        if (s->fan && s->fan[k] >= 0) {
+            const tmr_place other = tmr_project(s, p, tmr_on_fan(s, k, p).face);
+            return other.d2 < at.d2 ? other : at;
+        }
         for (int32_t c = tmr_ccw(s->opposite, first); c >= 0 && c != first; c = tmr_ccw(s->opposite, c)) {
             const tmr_place other = tmr_project(s, p, c / 3);
             if (other.d2 < at.d2) at = other;
@@ -125,6 +130,8 @@ static txm_dvec3 tmr_expected_normal(const tmr_work *w, int32_t a, int32_t b, in
     return w->s->normal[tmr_below_middle(w, v).face];
 }
 
+#define TMR_THIN 0.02 /* twice the area over the squared longest edge of a triangle without a direction */
+
 /* how well a triangle at these points agrees with the normals of its vertices: -1..1, -1 also for
    one without area */
 static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, txm_dvec3 pa,
@@ -133,7 +140,7 @@ static double tmr_agreement(const tmr_work *w, int32_t a, int32_t b, int32_t c, 
     const double length = txm_d3_len(n);
     const double longest =
         fmax(txm_d3_dist2(pa, pb), fmax(txm_d3_dist2(pb, pc), txm_d3_dist2(pc, pa)));
-    if (length <= 0.02 * longest) return -1;
+    if (length <= TMR_THIN * longest) return -1;
     return txm_d3_dot(n, tmr_expected_normal(w, a, b, c)) / length;
 }
 

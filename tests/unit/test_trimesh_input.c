@@ -663,6 +663,54 @@ static void test_junctions(void **state) {
     assert_int_equal(report.components, 2);
 }
 
+/* ---- large fans ---- */
+
+/* A cone of n faces, and as many below unless it is open. */
+static void cone(int n, int open) {
+    clear();
+    const uint32_t tip = vertex(0, 0, 1), centre = open ? tip : vertex(0, 0, 0);
+    const uint32_t rim = (uint32_t)in.vertices;
+    for (int k = 0; k < n; k++) vertex(cos(2 * TXM_PI * k / n), sin(2 * TXM_PI * k / n), 0);
+    for (int k = 0; k < n; k++) {
+        const uint32_t a = rim + (uint32_t)k, b = rim + (uint32_t)((k + 1) % n);
+        triangle(tip, a, b);
+        if (!open) triangle(centre, b, a);
+    }
+}
+
+/* Searching a large fan from coarse to fine finds about the place that looking at all faces does. */
+static void test_large_fans(void **state) {
+    static const int sizes[4] = {TMR_FAN_SMALL, TMR_FAN_SMALL + 1, 200, 3001};
+    txm_rng rng = txm_rng_make(7, 7);
+    (void)state;
+    for (int i = 0; i < 8; i++) {
+        const int n = sizes[i / 2], large = n > TMR_FAN_SMALL;
+        txm_arena arena;
+        tmr_surface s;
+        cone(n, i % 2);
+        const trimesh_desc desc = describe();
+        txm_arena_init(&arena, NULL);
+        assert_int_equal(tmr_surface_build(&desc, NULL, &arena, &report, &s), TXM_OK);
+        assert_int_equal(tmr_find_fans(&s, &arena, &arena), TXM_OK);
+        assert_int_equal(s.fan != NULL, large);
+        for (int32_t v = 0; v < s.vertex_count && large; v++)
+            assert_int_equal(s.fan[v] >= 0, v < (i % 2 ? 1 : 2));
+        tmr_surface plain = s;
+        plain.fan = NULL;
+        for (int k = 0; k < 200; k++) {
+            const txm_dvec3 p = txm_d3(txm_rng_float(&rng) - 0.5, txm_rng_float(&rng) - 0.5,
+                                       txm_rng_float(&rng) - 0.5);
+            const tmr_place at = tmr_on_fan(&s, 0, p), all = tmr_on_fan(&plain, 0, p);
+            /* positions are floats, so that the distances along the fan have shallow minima */
+            assert_true(sqrt(at.d2) <= sqrt(all.d2) + 1e-6);
+            /* walking ends as near, from any face */
+            const int32_t from = (int32_t)txm_rng_below(&rng, (uint32_t)s.face_count);
+            assert_true(tmr_project(&s, p, from).d2 <= tmr_project(&plain, p, from).d2 + 1e-6);
+        }
+        txm_arena_free(&arena);
+    }
+}
+
 /* ---- anything at all ---- */
 
 /* Random triangles of few vertices, some of which coincide or nearly so: a surface or a refusal. */
@@ -778,6 +826,7 @@ int main(void) {
         cmocka_unit_test(test_inner_wall),  cmocka_unit_test(test_stars),
         cmocka_unit_test(test_one_sided),   cmocka_unit_test(test_double_edge),
         cmocka_unit_test(test_junctions),   cmocka_unit_test(test_soup),
+        cmocka_unit_test(test_large_fans),
         cmocka_unit_test(test_damage),      cmocka_unit_test(test_faults),
         cmocka_unit_test(test_progress),    cmocka_unit_test(test_memory),
     };

@@ -516,6 +516,42 @@ static void test_dirt(void **state) {
     }
 }
 
+/* A prism of three sides, each cut into n quads: the whole triangles below and above become fans of
+   splinters, all of whose short sides lie on one edge of theirs. */
+static void make_splinters(int n) {
+    uint32_t ring[2][3];
+    begin(2, 1, 0);
+    for (int z = 0; z < 2; z++)
+        for (int k = 0; k < 3; k++)
+            ring[z][k] = vertex(cos(2 * TXM_PI * k / 3), sin(2 * TXM_PI * k / 3), z);
+    triangle(ring[0][2], ring[0][1], ring[0][0]);
+    triangle(ring[1][0], ring[1][1], ring[1][2]);
+    for (int k = 0; k < 3; k++) {
+        const float *a = in.at + 3 * ring[0][k], *b = in.at + 3 * ring[0][(k + 1) % 3];
+        uint32_t low = ring[0][k], high = ring[1][k];
+        for (int i = 1; i <= n; i++) {
+            const double t = (double)i / n, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
+            const uint32_t l = i < n ? vertex(x, y, 0) : ring[0][(k + 1) % 3];
+            const uint32_t h = i < n ? vertex(x, y, 1) : ring[1][(k + 1) % 3];
+            quad(low, l, h, high);
+            low = l;
+            high = h;
+        }
+    }
+}
+
+static void test_splinters(void **state) {
+    (void)state;
+    for (int n = 10; n <= 1000; n *= 10) {
+        make_splinters(n);
+        const trimesh_desc d = describe(1000, TRIMESH_LATTICE);
+        found f;
+        trimesh_mesh_free(made(&d, 0.02, &f));
+        assert_int_equal(report.stitched, 6 * (n - 1));
+        assert_true(f.quality > 0.94);
+    }
+}
+
 /* ---- refusals ------------------------------------------------------------------------------- */
 
 static txm_status refused(const trimesh_desc *d, char message[]) {
@@ -795,6 +831,7 @@ int main(void) {
         cmocka_unit_test(test_scale),       cmocka_unit_test(test_scale_is_relative),
         cmocka_unit_test(test_adapt),       cmocka_unit_test(test_line_spacing),
         cmocka_unit_test(test_soup),        cmocka_unit_test(test_dirt),
+        cmocka_unit_test(test_splinters),
         cmocka_unit_test(test_too_small),   cmocka_unit_test(test_bad_arguments),
         cmocka_unit_test(test_faults),      cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_steps),
