@@ -5715,8 +5715,10 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
 
 /* ---- the right number --------------------------------------------------------------------- */
 
-/* costs above this rank alike: keys, which have three decimals, have 32 bits */
-enum { TMR_MOST_COST = 4000000 };
+enum {
+    TMR_MOST_COST = 4000000, /* costs above this rank alike: keys, which have three decimals, have 32 bits */
+    TMR_IDLE = 3             /* ours: after so many passes without a change stronger means are tried */
+};
 
 /* how collapsing (sign -1) or splitting (+1) the edge of c would change the cost of valences */
 static int64_t tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
@@ -5758,6 +5760,7 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
     txm_pair *pairs, *room;
     *missing = target - m->live;
     if (*missing == 0) return TXM_OK;
+    int idle = 0; /* passes without any change */
     pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     if (!pairs || !room) return TXM_OUT_OF_MEMORY;
@@ -5803,6 +5806,11 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
         tmr_flip_delaunay(w, 2);
         w->mask = NULL;
         if (done == 0 && pass >= 40) break;
+        idle = done ? 0 : idle + 1;
+        if (idle == TMR_IDLE) { /* go on to what allows more */
+            pass = pass < 20 ? 19 : pass < 30 ? 29 : 39;
+            idle = 0;
+        }
     }
     return TXM_OK;
 }
@@ -8154,6 +8162,8 @@ TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh) {
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
+#define TMR_FLAT_VOLUME 1e-6 /* ours: thickness of what has no inside, in diagonals               */
+
 enum tmr_stage {
     TMR_STAGE_MEND,
     TMR_STAGE_SAMPLE,
@@ -8363,6 +8373,11 @@ static txm_status tmr_surface_crosses(trimesh_job *job, int what, int *crosses) 
     return TXM_OK;
 }
 
+/* Is the surface closed, but without an inside? Then it lies on itself however dense the mesh is. */
+static int tmr_is_flat(const tmr_surface *s) {
+    return s->loop_count == 0 && fabs(s->volume) <= TMR_FLAT_VOLUME * s->area;
+}
+
 /* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
    with shorter edges where the surface bends. *retries receives 0 if nothing is left to try. */
 static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
@@ -8418,7 +8433,7 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         if (status != TXM_OK || faults == 0) return status;
         status = tmr_surface_crosses(job, TMR_ANY_CROSSING, &crosses);
         if (status != TXM_OK || crosses) return status;
-        if (50 * faults > (long)job->w.m.live_faces) { /* so many: sheets lie on each other */
+        if (50 * faults > (long)job->w.m.live_faces || tmr_is_flat(&job->s)) { /* sheets lie on each other */
             status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);
             if (status != TXM_OK || crosses) return status;
         }

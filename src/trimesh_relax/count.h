@@ -5,8 +5,10 @@
 
 /* ---- the right number --------------------------------------------------------------------- */
 
-/* costs above this rank alike: keys, which have three decimals, have 32 bits */
-enum { TMR_MOST_COST = 4000000 };
+enum {
+    TMR_MOST_COST = 4000000, /* costs above this rank alike: keys, which have three decimals, have 32 bits */
+    TMR_IDLE = 3             /* ours: after so many passes without a change stronger means are tried */
+};
 
 /* how collapsing (sign -1) or splitting (+1) the edge of c would change the cost of valences */
 static int64_t tmr_count_cost(const tmr_mesh *m, int32_t c, int sign) {
@@ -48,6 +50,7 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
     txm_pair *pairs, *room;
     *missing = target - m->live;
     if (*missing == 0) return TXM_OK;
+    int idle = 0; /* passes without any change */
     pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     if (!pairs || !room) return TXM_OUT_OF_MEMORY;
@@ -93,6 +96,11 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
         tmr_flip_delaunay(w, 2);
         w->mask = NULL;
         if (done == 0 && pass >= 40) break;
+        idle = done ? 0 : idle + 1;
+        if (idle == TMR_IDLE) { /* go on to what allows more */
+            pass = pass < 20 ? 19 : pass < 30 ? 29 : 39;
+            idle = 0;
+        }
     }
     return TXM_OK;
 }

@@ -10,6 +10,8 @@
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
+#define TMR_FLAT_VOLUME 1e-6 /* ours: thickness of what has no inside, in diagonals               */
+
 enum tmr_stage {
     TMR_STAGE_MEND,
     TMR_STAGE_SAMPLE,
@@ -219,6 +221,11 @@ static txm_status tmr_surface_crosses(trimesh_job *job, int what, int *crosses) 
     return TXM_OK;
 }
 
+/* Is the surface closed, but without an inside? Then it lies on itself however dense the mesh is. */
+static int tmr_is_flat(const tmr_surface *s) {
+    return s->loop_count == 0 && fabs(s->volume) <= TMR_FLAT_VOLUME * s->area;
+}
+
 /* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
    with shorter edges where the surface bends. *retries receives 0 if nothing is left to try. */
 static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
@@ -274,7 +281,7 @@ static txm_status tmr_job_finish(trimesh_job *job) {
         if (status != TXM_OK || faults == 0) return status;
         status = tmr_surface_crosses(job, TMR_ANY_CROSSING, &crosses);
         if (status != TXM_OK || crosses) return status;
-        if (50 * faults > (long)job->w.m.live_faces) { /* so many: sheets lie on each other */
+        if (50 * faults > (long)job->w.m.live_faces || tmr_is_flat(&job->s)) { /* sheets lie on each other */
             status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);
             if (status != TXM_OK || crosses) return status;
         }
