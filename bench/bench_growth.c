@@ -1,10 +1,12 @@
-/* bench_growth.c - how time and memory grow with the size of the task: bench_growth EXEMPLAR...
+/* bench_growth.c - how time and memory grow with the size of the task:
+   bench_growth [--only WORD] EXEMPLAR...
    SPDX-License-Identifier: MIT OR Unlicense
 
    A line for each thing that the suite does: the time of the processor for one unit of the result at
    four sizes, on one thread; the exponent e of the power law, seconds = c units^e, that fits them best,
-   1 if time is in proportion; how much sooner the largest is done on all cores; its memory for one unit.
-   Of several runs the fastest counts. Only the first picture is used. */
+   1 if time is in proportion; the time of the clock for one unit of the largest on one thread and on two,
+   and their ratio; its memory for one unit. Of several runs the fastest counts. Only the first picture is
+   used. --only: the lines whose name has that word. */
 #define _XOPEN_SOURCE 700 /* clock_gettime, popen */
 #define TEXPATCH_IMPLEMENTATION
 #include "texpatch.h"
@@ -143,36 +145,73 @@ static void more_tiles(trial *t) {
     make_tiles(t, colors, t->size / (colors * colors * colors * colors), 64);
 }
 
-static void forest(trial *t) {
-    txm_env env = make_env(&t->threads);
+/* t->size trees; r: how long they grew. */
+static treepieces_forest *grow(trial *t, txm_env *env, treepieces_kit **kit, result *r) {
     treepieces_forest_desc desc;
     treepieces_species oak;
     treepieces_forest *made;
-    treepieces_kit *kit;
     memset(&desc, 0, sizeof desc);
-    if (treepieces_kit_make(NULL, 0, &env, &kit) != TXM_OK ||
-        treepieces_preset("oak", &env, &oak) != TXM_OK)
-        give_up("forest", env.message);
-    desc.kit = kit;
+    if (treepieces_kit_make(NULL, 0, env, kit) != TXM_OK || treepieces_preset("oak", env, &oak) != TXM_OK)
+        give_up("forest", env->message);
+    desc.kit = *kit;
     desc.species = &oak;
     desc.species_count = 1;
     desc.tree_count = t->size;
     desc.max_pieces = FEW_PIECES;
     const watch w = start();
-    if (treepieces_forest_make(&desc, &env, &made) != TXM_OK) give_up("forest", env.message);
-    stop(&w, &t->best);
+    if (treepieces_forest_make(&desc, env, &made) != TXM_OK) give_up("forest", env->message);
+    stop(&w, r);
     t->units = t->size;
+    return made;
+}
+
+static void forest(trial *t) {
+    txm_env env = make_env(&t->threads);
+    treepieces_kit *kit;
+    treepieces_forest_free(grow(t, &env, &kit, &t->best));
+    treepieces_kit_free(kit);
+}
+
+/* A step of the wind; bones and state are the caller's memory, and count as such. */
+static void sway(trial *t) {
+    txm_env env = make_env(&t->threads);
+    const treepieces_wind wind = {0.3f, 8, 0.5f, 1, 0};
+    result unused = no_result;
+    treepieces_kit *kit;
+    treepieces_forest *made = grow(t, &env, &kit, &unused);
+    const watch w = start();
+    float *bones = (float *)txm_alloc(&env, made->node_count * TREEPIECES_BONE * sizeof(float));
+    float *state = (float *)txm_alloc(&env, made->node_count * 4 * sizeof(float));
+    if (!bones || !state) give_up("sway", "no memory");
+    memset(state, 0, made->node_count * 4 * sizeof(float));
+    memset(bones, 0, made->node_count * TREEPIECES_BONE * sizeof(float));
+    stop(&w, &unused);
+    t->best.peak = unused.peak;
+    for (int i = 0; i < RUNS; i++) {
+        result r = no_result;
+        const watch step = start();
+        if (treepieces_sway(made, &wind, 0.1 * i, 0.1, NULL, &env, state, bones) != TXM_OK)
+            give_up("sway", env.message);
+        stop(&step, &r);
+        if (r.cpu < t->best.cpu) t->best.cpu = r.cpu;
+        if (r.seconds < t->best.seconds) t->best.seconds = r.seconds;
+    }
+    txm_free(&env, bones);
+    txm_free(&env, state);
     treepieces_forest_free(made);
     treepieces_kit_free(kit);
 }
 
 static void write_png(trial *t) {
     txm_image image = resized(t->picture, t->size);
+    txm_env env = make_env(&t->threads);
+    image_job job = {0};
     unsigned char *bytes;
     size_t size;
     const char *why;
+    job.env = &env;
     const watch w = start();
-    if (!image_encode(NULL, ".png", &image, &bytes, &size, &why)) give_up("PNG", why);
+    if (!image_encode(&job, ".png", &image, &bytes, &size, &why)) give_up("PNG", why);
     stop(&w, &t->best);
     t->units = (double)t->size * t->size;
     free(bytes);
@@ -216,8 +255,9 @@ static void line(const task *what, const txm_image *picture) {
         fflush(stdout);
     }
     const trial *one = &t[SIZES - 1];
-    const trial all = measure(what, one->size, env_cores(), picture);
-    printf(" %8.2f %7.2f %11.1f  %s\n", exponent(t), one->best.seconds / all.best.seconds,
+    const trial two = measure(what, one->size, 2, picture);
+    printf(" %8.2f %7.3g %7.3g %5.2f %11.1f  %s\n", exponent(t), 1e6 * one->best.seconds / one->units,
+           1e6 * two.best.seconds / one->units, one->best.seconds / two.best.seconds,
            (double)one->best.peak / one->units, what->unit);
     fflush(stdout);
 }
@@ -231,20 +271,24 @@ int main(int argc, char **argv) {
         {"tiles, by side", "pixel", {64, 96, 128, 192}, tiles},
         {"tiles, by number", "pixel", {16, 32, 81, 256}, more_tiles},
         {"forest", "tree", {10, 100, 1000, 10000}, forest},
+        {"sway", "tree", {10, 100, 1000, 10000}, sway},
         {"write PNG", "pixel", {512, 1024, 2048, 4096}, write_png},
     };
     txm_image picture;
     const char *why;
+    const int has_word = argc > 3 && !strcmp(argv[1], "--only");
+    const char *word = has_word ? argv[2] : "", *path = argv[has_word ? 3 : 1];
     if (argc < 2) {
-        fprintf(stderr, "usage: bench_growth EXEMPLAR...\n");
+        fprintf(stderr, "usage: bench_growth [--only WORD] EXEMPLAR...\n");
         return 1;
     }
     env_let_threads_sleep(argv);
-    if (!image_read(argv[1], 0, &picture, &why)) give_up(argv[1], why);
-    printf("%s, %d x %d: microseconds for a unit by size, one thread; all: %d threads\n\n",
-           file_name(argv[1]), picture.width, picture.height, env_cores());
-    printf("what                 size: us at each of four%33s exponent  sooner bytes/unit  unit\n", "");
-    for (size_t i = 0; i < sizeof tasks / sizeof tasks[0]; i++) line(&tasks[i], &picture);
+    if (!image_read(path, 0, &picture, &why)) give_up(path, why);
+    printf("%s, %d x %d: microseconds for a unit by size, one thread; the largest by the clock; %d cores\n\n",
+           file_name(path), picture.width, picture.height, env_cores());
+    printf("what                 size: us at each of four%33s exponent     one     two ratio  bytes/unit  unit\n", "");
+    for (size_t i = 0; i < sizeof tasks / sizeof tasks[0]; i++)
+        if (strstr(tasks[i].what, word)) line(&tasks[i], &picture);
     image_free(&picture);
     return 0;
 }
