@@ -328,6 +328,8 @@ typedef struct treepieces_species {
     float crown_base, crown_top, crown_width; /* in lengths of the trunk; the width is a diameter */
     float shade;      /* pruning by light: axes end where there are more than this many pieces above
                          them per m^2 of ground; 0 = no pruning                                   */
+    float phototropism; /* 0..1: how strongly branches turn from where more pieces are above to where
+                         fewer are, and how long those in the shade wait for their turn to grow  */
     float clearance;  /* 0..10: branches keep apart by this times the sum of their radii: they turn out
                          of the way of what grew before them, or end. 0 = they may cross, as
                          they may under the caller's rule and those of the paper                  */
@@ -1524,6 +1526,7 @@ static const tpc_field tpc_fields[] = {
     TPC_FIELD(crown_top, TPC_REAL, 1, 0.01f, 3),
     TPC_FIELD(crown_width, TPC_REAL, 1, 0.01f, 10),
     TPC_FIELD(shade, TPC_REAL, 1, 0, 1e6f),
+    TPC_FIELD(phototropism, TPC_REAL, 1, 0, 1),
     TPC_FIELD(clearance, TPC_REAL, 1, 0, 10),
     TPC_FIELD(stiffness, TPC_REAL, 1, 0.01f, 100),
     TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_COMPOUND),
@@ -1781,7 +1784,7 @@ static txm_status tpc_species_check(const treepieces_species *s, txm_env *env) {
 static const char tpc_fresh[] =
     "flare 1.6\n"
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
-    "clearance 1.2\n"
+    "phototropism 0\n" "clearance 1.2\n"
     "stiffness 1\n"
     "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud_kind round\n" "cloud 0.5\n"
     "cloud_flat 0.8\n"
@@ -1807,7 +1810,7 @@ static const char tpc_fresh[] =
     "leaves_start 0.2\n";
 
 static const char tpc_oak[] =
-    "name oak\n" "flare 1.7\n" "stiffness 1.4\n"
+    "name oak\n" "phototropism 0.2\n" "flare 1.7\n" "stiffness 1.4\n"
     "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 1.45\n"
     "leaf_shape lobed\n" "leaf_count 28\n" "leaf_size 0.42\n" "cloud 1.2\n" "cloud_flat 0.8\n"
     "leaf_color 0.29 0.4 0.13\n" "bark_color 0.4 0.35 0.29\n"
@@ -1831,7 +1834,7 @@ static const char tpc_oak[] =
     "wander 16\n" "leaves 0.5\n";
 
 static const char tpc_beech[] =
-    "name beech\n" "flare 1.8\n" "stiffness 1.2\n"
+    "name beech\n" "phototropism 0.15\n" "flare 1.8\n" "stiffness 1.2\n"
     "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 0.95\n"
     "leaf_shape oval\n" "leaf_count 48\n" "leaf_size 0.36\n" "cloud_kind layers\n" "cloud 1.25\n"
     "cloud_flat 0.5\n"
@@ -1852,7 +1855,7 @@ static const char tpc_beech[] =
     "wander 10\n" "sag 15\n" "flatten 0.5\n" "leaves 0.6\n" "leaves_start 0.2\n";
 
 static const char tpc_maple[] =
-    "name maple\n" "flare 1.5\n"
+    "name maple\n" "phototropism 0.2\n" "flare 1.5\n"
     "envelope ellipsoid\n" "crown_base 0.12\n" "crown_top 1.1\n" "crown_width 0.85\n"
     "leaf_shape palmate\n" "leaf_count 24\n" "leaf_size 0.42\n" "cloud 1\n" "cloud_flat 0.85\n"
     "leaf_color 0.74 0.4 0.12\n" "bark_color 0.42 0.38 0.33\n"
@@ -1872,7 +1875,7 @@ static const char tpc_maple[] =
     "wander 10\n" "tropism 0.08\n" "leaves 0.7\n" "leaves_start 0.2\n";
 
 static const char tpc_birch[] =
-    "name birch\n" "flare 1.3\n" "stiffness 0.7\n"
+    "name birch\n" "phototropism 0.1\n" "flare 1.3\n" "stiffness 0.7\n"
     "envelope ellipsoid\n" "crown_base 0.1\n" "crown_top 1.12\n" "crown_width 0.5\n"
     "leaf_shape heart\n" "leaf_count 12\n" "leaf_size 0.5\n" "cloud 0.75\n" "cloud_flat 1.3\n"
     "leaf_color 0.4 0.52 0.16\n" "bark_kind lenticels\n" "bark_color 0.85 0.83 0.79\n"
@@ -1908,7 +1911,7 @@ static const char tpc_poplar[] =
     "angle_base 32\n" "angle_top 25\n" "wander 7\n" "tropism 0.12\n" "leaves 0.6\n";
 
 static const char tpc_willow[] =
-    "name willow\n" "flare 1.6\n" "stiffness 0.6\n"
+    "name willow\n" "phototropism 0.1\n" "flare 1.6\n" "stiffness 0.6\n"
     "envelope ellipsoid\n" "crown_base 0\n" "crown_top 1.05\n" "crown_width 1.6\n"
     "leaf_shape lance\n" "leaf_count 16\n" "leaf_size 0.9\n" "cloud_kind strips\n" "cloud 1\n"
     "cloud_flat 2\n"
@@ -1929,7 +1932,7 @@ static const char tpc_willow[] =
     "wander 5\n" "tropism -0.3\n" "leaves 0.85\n" "leaves_start 0\n";
 
 static const char tpc_almond[] =
-    "name almond\n" "flare 1.4\n"
+    "name almond\n" "phototropism 0.1\n" "flare 1.4\n"
     "leaf_shape blossom\n" "leaf_count 44\n" "leaf_size 0.28\n" "cloud 0.42\n" "cloud_flat 0.9\n"
     "leaf_color 0.94 0.76 0.8\n" "bark_kind lenticels\n" "bark_color 0.3 0.25 0.22\n"
     "order 0\n" "length 5.5\n" "radius 0.026\n" "taper 0.06\n" "segments 14\n"
@@ -1946,7 +1949,7 @@ static const char tpc_almond[] =
     "angle_base 45\n" "angle_top 40\n" "wander 12\n" "tropism 0.06\n" "leaves 0.6\n";
 
 static const char tpc_pine[] =
-    "name pine\n" "flare 1.4\n"
+    "name pine\n" "phototropism 0.15\n" "flare 1.4\n"
     "leaf_shape needle\n" "leaf_count 32\n" "leaf_size 0.66\n" "cloud_kind shoots\n" "cloud 0.95\n"
     "cloud_flat 0.32\n"
     "leaf_color 0.23 0.335 0.185\n" "bark_kind plates\n" "bark_color 0.55 0.36 0.24\n"
@@ -1983,7 +1986,7 @@ static const char tpc_spruce[] =
     "wander 6\n" "sag 25\n" "flatten 0.7\n" "leaves 0.8\n" "leaves_start 0.1\n";
 
 static const char tpc_dead[] =
-    "name dead\n" "flare 1.7\n" "stiffness 2\n" "leaf_count 0\n"
+    "name dead\n" "phototropism 0.1\n" "flare 1.7\n" "stiffness 2\n" "leaf_count 0\n"
     "bark_color 0.5 0.47 0.43\n"
     "order 0\n" "length 9\n" "radius 0.036\n" "taper 0.3\n" "segments 12\n"
     "start 0.3\n" "side 0.55\n" "fork 0.18\n" "fork_angle 28\n" "fork_ratio 0.85\n"
@@ -2694,6 +2697,8 @@ static const float tpc_cell_steps = 1.25f;    /* of the grid of stems, in steps 
 static const float tpc_dome = 0.8f;           /* fall of the dome over crowns, see tpc_limit_rise  */
 static const float tpc_slack = 0.8f;          /* more clearance, as tubes cut corners             */
 static const float tpc_beyond = 10;          /* importance of reach beyond the crown, over length */
+static const float tpc_waiting = 100;        /* of axes in the shade, over the share of pieces above */
+static const float tpc_rise = 0.5f;          /* of axes towards the light, over their turn aside     */
 
 /* The open rim where an axis goes on. */
 typedef struct tpc_bud {
@@ -2764,6 +2769,51 @@ static void tpc_draw_for(tpc_growth *g, uint64_t seed, uint64_t stream) {
     g->rng = txm_rng_make(seed, stream);
 }
 
+/* ---- growing: light --------------------------------------------------------------------------- */
+
+/* the shade cell of a position; returns the side of a cell */
+static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
+    const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
+    for (int k = 0; k < 3; k++) {
+        const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
+        const float at = position[k] / side + middle;
+        cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
+    }
+    return side;
+}
+
+static int tpc_casts_shade(const treepieces_species *species) {
+    return species->shade > 0 || species->phototropism > 0;
+}
+
+static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
+    int c[3];
+    if (!tpc_casts_shade(g->species)) return;
+    tpc_cell(g, position, c);
+    uint16_t *column = g->shade[c[0]][c[2]];
+    for (int y = 0; y <= c[1]; y++) column[y] = (uint16_t)(column[y] + (column[y] < UINT16_MAX));
+}
+
+/* The part of all pieces that lies above a position. */
+static float tpc_shade_share(const tpc_growth *g, const float position[3]) {
+    int c[3];
+    tpc_cell(g, position, c);
+    return (float)g->shade[c[0]][c[2]][c[1]] / (float)g->sketch.segment_count;
+}
+
+/* Towards the light: from where more pieces are above to where fewer are; each component -1..1. */
+static void tpc_find_light(const tpc_growth *g, const float position[3], float towards[3]) {
+    int c[3];
+    tpc_cell(g, position, c);
+    for (int k = 0; k < 3; k++) {
+        int before[3] = {c[0], c[1], c[2]}, after[3] = {c[0], c[1], c[2]};
+        if (before[k] > 0) before[k]--;
+        if (after[k] + 1 < TPC_GRID) after[k]++;
+        const int low = g->shade[before[0]][before[2]][before[1]], high = g->shade[after[0]][after[2]][after[1]];
+        towards[k] = (float)(low - high) / (float)(low + high + 1);
+    }
+}
+
 /* ---- growing: rims by the importance of their axes ------------------------------------------ */
 
 /* The bits of a positive float, which grow about as its logarithm, by 2^23 per octave. */
@@ -2779,14 +2829,17 @@ static int tpc_bucket(float importance) {
 }
 
 /* The longer an axis is, and the further it leads out of the box about what has grown so far, the more
-   does the tree lose without it. */
+   does the tree lose without it; the less light its end gets, the less. */
 static float tpc_importance(const tpc_growth *g, const tpc_wait *w) {
     float beyond = 0;
     for (int k = 0; k < 3; k++) {
         beyond = txm_maxf(beyond, (k == 1 ? 2.0f : 1.0f) * (w->end[k] - g->high[k]));
         if (k != 1) beyond = txm_maxf(beyond, g->low[k] - w->end[k]);
     }
-    return (w->length + tpc_beyond * beyond) / g->trunk;
+    float length = w->length;
+    const float light = g->species->phototropism;
+    if (light > 0) length /= 1 + tpc_waiting * light * tpc_shade_share(g, w->end);
+    return (length + tpc_beyond * beyond) / g->trunk;
 }
 
 /* Put a rim after the last one into its bucket. */
@@ -2830,30 +2883,12 @@ static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     return x * x + z * z > r * r;
 }
 
-/* the shade cell of a position; returns the side of a cell */
-static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
-    const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
-    for (int k = 0; k < 3; k++) {
-        const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
-        const float at = position[k] / side + middle;
-        cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
-    }
-    return side;
-}
-
 static int tpc_is_shaded(const tpc_growth *g, const tpc_bud *bud) {
     if (!(g->species->shade > 0) || bud->order == 0) return 0;
     int c[3];
     const float side = tpc_cell(g, bud->position, c) / g->scale;
     if (c[1] + 1 >= TPC_GRID) return 0;
     return (float)g->shade[c[0]][c[2]][c[1] + 1] > g->species->shade * side * side;
-}
-
-static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
-    int c[3];
-    if (!(g->species->shade > 0)) return;
-    tpc_cell(g, position, c);
-    for (int y = 0; y <= c[1]; y++) g->shade[c[0]][c[2]][y]++;
 }
 
 /* ---- growing: the grammar ------------------------------------------------------------------ */
@@ -2970,7 +3005,7 @@ static void tpc_limit_rise(const tpc_growth *g, tpc_bud *bud) {
     if (room < 0.5f * bud->step) bud->along = 1;
 }
 
-/* Turn the axis a little: wander, tropism, sag. */
+/* Turn the axis a little: wander, tropism, light, sag. */
 static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
     const treepieces_order *o = tpc_order(g, bud->order);
     float *h = bud->heading;
@@ -2982,10 +3017,15 @@ static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
         for (int k = 0; k < 3; k++) h[k] += aside[k];
     }
     /* the component of "up" orthogonal to the heading is the sine of the angle between them */
-    const float up = o->tropism, rise = h[1];
+    const float up = o->tropism, rise = h[1], light = bud->order > 0 ? g->species->phototropism : 0;
     h[0] -= up * rise * h[0];
     h[1] += up * (1 - rise * rise);
     h[2] -= up * rise * h[2];
+    if (light > 0) {
+        float towards[3];
+        tpc_find_light(g, bud->position, towards);
+        for (int k = 0; k < 3; k++) h[k] += (k == 1 ? tpc_rise : 1) * light * towards[k];
+    }
     if (o->sag != 0) {
         const float at = bud->along + 0.5f * length / bud->length;
         const float fall = o->sag * degree * 2 * at * (length / bud->length);
@@ -3304,7 +3344,7 @@ static void tpc_begin_tree(tpc_growth *g, tpc_bud *bud) {
     g->status = TXM_OK;
     memset(g->type_counts, 0, sizeof g->type_counts);
     for (int b = 0; b < TPC_BUCKETS; b++) g->first[b] = g->last[b] = -1;
-    if (g->species->shade > 0) memset(g->shade, 0, sizeof g->shade);
+    if (tpc_casts_shade(g->species)) memset(g->shade, 0, sizeof g->shade);
     tpc_draw_for(g, g->place.seed, 0x7265657069656365u);
     g->scale = g->place.scale > 0 ? g->place.scale : 1;
     g->trunk = o->length * g->scale * tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);

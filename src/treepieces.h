@@ -328,6 +328,8 @@ typedef struct treepieces_species {
     float crown_base, crown_top, crown_width; /* in lengths of the trunk; the width is a diameter */
     float shade;      /* pruning by light: axes end where there are more than this many pieces above
                          them per m^2 of ground; 0 = no pruning                                   */
+    float phototropism; /* 0..1: how strongly branches turn from where more pieces are above to where
+                         fewer are, and how long those in the shade wait for their turn to grow  */
     float clearance;  /* 0..10: branches keep apart by this times the sum of their radii: they turn out
                          of the way of what grew before them, or end. 0 = they may cross, as
                          they may under the caller's rule and those of the paper                  */

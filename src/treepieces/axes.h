@@ -57,7 +57,7 @@ static void tpc_begin_tree(tpc_growth *g, tpc_bud *bud) {
     g->status = TXM_OK;
     memset(g->type_counts, 0, sizeof g->type_counts);
     for (int b = 0; b < TPC_BUCKETS; b++) g->first[b] = g->last[b] = -1;
-    if (g->species->shade > 0) memset(g->shade, 0, sizeof g->shade);
+    if (tpc_casts_shade(g->species)) memset(g->shade, 0, sizeof g->shade);
     tpc_draw_for(g, g->place.seed, 0x7265657069656365u);
     g->scale = g->place.scale > 0 ? g->place.scale : 1;
     g->trunk = o->length * g->scale * tpc_uniform(g, 1 - o->length_spread, 1 + o->length_spread);

@@ -26,6 +26,8 @@ static const float tpc_cell_steps = 1.25f;    /* of the grid of stems, in steps 
 static const float tpc_dome = 0.8f;           /* fall of the dome over crowns, see tpc_limit_rise  */
 static const float tpc_slack = 0.8f;          /* more clearance, as tubes cut corners             */
 static const float tpc_beyond = 10;          /* importance of reach beyond the crown, over length */
+static const float tpc_waiting = 100;        /* of axes in the shade, over the share of pieces above */
+static const float tpc_rise = 0.5f;          /* of axes towards the light, over their turn aside     */
 
 /* The open rim where an axis goes on. */
 typedef struct tpc_bud {
@@ -96,6 +98,51 @@ static void tpc_draw_for(tpc_growth *g, uint64_t seed, uint64_t stream) {
     g->rng = txm_rng_make(seed, stream);
 }
 
+/* ---- growing: light --------------------------------------------------------------------------- */
+
+/* the shade cell of a position; returns the side of a cell */
+static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
+    const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
+    for (int k = 0; k < 3; k++) {
+        const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
+        const float at = position[k] / side + middle;
+        cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
+    }
+    return side;
+}
+
+static int tpc_casts_shade(const treepieces_species *species) {
+    return species->shade > 0 || species->phototropism > 0;
+}
+
+static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
+    int c[3];
+    if (!tpc_casts_shade(g->species)) return;
+    tpc_cell(g, position, c);
+    uint16_t *column = g->shade[c[0]][c[2]];
+    for (int y = 0; y <= c[1]; y++) column[y] = (uint16_t)(column[y] + (column[y] < UINT16_MAX));
+}
+
+/* The part of all pieces that lies above a position. */
+static float tpc_shade_share(const tpc_growth *g, const float position[3]) {
+    int c[3];
+    tpc_cell(g, position, c);
+    return (float)g->shade[c[0]][c[2]][c[1]] / (float)g->sketch.segment_count;
+}
+
+/* Towards the light: from where more pieces are above to where fewer are; each component -1..1. */
+static void tpc_find_light(const tpc_growth *g, const float position[3], float towards[3]) {
+    int c[3];
+    tpc_cell(g, position, c);
+    for (int k = 0; k < 3; k++) {
+        int before[3] = {c[0], c[1], c[2]}, after[3] = {c[0], c[1], c[2]};
+        if (before[k] > 0) before[k]--;
+        if (after[k] + 1 < TPC_GRID) after[k]++;
+        const int low = g->shade[before[0]][before[2]][before[1]], high = g->shade[after[0]][after[2]][after[1]];
+        towards[k] = (float)(low - high) / (float)(low + high + 1);
+    }
+}
+
 /* ---- growing: rims by the importance of their axes ------------------------------------------ */
 
 /* The bits of a positive float, which grow about as its logarithm, by 2^23 per octave. */
@@ -111,14 +158,17 @@ static int tpc_bucket(float importance) {
 }
 
 /* The longer an axis is, and the further it leads out of the box about what has grown so far, the more
-   does the tree lose without it. */
+   does the tree lose without it; the less light its end gets, the less. */
 static float tpc_importance(const tpc_growth *g, const tpc_wait *w) {
     float beyond = 0;
     for (int k = 0; k < 3; k++) {
         beyond = txm_maxf(beyond, (k == 1 ? 2.0f : 1.0f) * (w->end[k] - g->high[k]));
         if (k != 1) beyond = txm_maxf(beyond, g->low[k] - w->end[k]);
     }
-    return (w->length + tpc_beyond * beyond) / g->trunk;
+    float length = w->length;
+    const float light = g->species->phototropism;
+    if (light > 0) length /= 1 + tpc_waiting * light * tpc_shade_share(g, w->end);
+    return (length + tpc_beyond * beyond) / g->trunk;
 }
 
 /* Put a rim after the last one into its bucket. */
@@ -162,30 +212,12 @@ static int tpc_is_outside(const tpc_growth *g, const tpc_bud *bud) {
     return x * x + z * z > r * r;
 }
 
-/* the shade cell of a position; returns the side of a cell */
-static float tpc_cell(const tpc_growth *g, const float position[3], int cell[3]) {
-    const float side = tpc_grid_width * g->trunk / (float)TPC_GRID;
-    for (int k = 0; k < 3; k++) {
-        const float middle = k == 1 ? 0 : (float)TPC_GRID / 2;
-        const float at = position[k] / side + middle;
-        cell[k] = at > 0 ? at < (float)TPC_GRID ? (int)at : TPC_GRID - 1 : 0;
-    }
-    return side;
-}
-
 static int tpc_is_shaded(const tpc_growth *g, const tpc_bud *bud) {
     if (!(g->species->shade > 0) || bud->order == 0) return 0;
     int c[3];
     const float side = tpc_cell(g, bud->position, c) / g->scale;
     if (c[1] + 1 >= TPC_GRID) return 0;
     return (float)g->shade[c[0]][c[2]][c[1] + 1] > g->species->shade * side * side;
-}
-
-static void tpc_cast_shade(tpc_growth *g, const float position[3]) {
-    int c[3];
-    if (!(g->species->shade > 0)) return;
-    tpc_cell(g, position, c);
-    for (int y = 0; y <= c[1]; y++) g->shade[c[0]][c[2]][y]++;
 }
 
 /* ---- growing: the grammar ------------------------------------------------------------------ */
@@ -302,7 +334,7 @@ static void tpc_limit_rise(const tpc_growth *g, tpc_bud *bud) {
     if (room < 0.5f * bud->step) bud->along = 1;
 }
 
-/* Turn the axis a little: wander, tropism, sag. */
+/* Turn the axis a little: wander, tropism, light, sag. */
 static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
     const treepieces_order *o = tpc_order(g, bud->order);
     float *h = bud->heading;
@@ -314,10 +346,15 @@ static void tpc_steer(tpc_growth *g, tpc_bud *bud, float length) {
         for (int k = 0; k < 3; k++) h[k] += aside[k];
     }
     /* the component of "up" orthogonal to the heading is the sine of the angle between them */
-    const float up = o->tropism, rise = h[1];
+    const float up = o->tropism, rise = h[1], light = bud->order > 0 ? g->species->phototropism : 0;
     h[0] -= up * rise * h[0];
     h[1] += up * (1 - rise * rise);
     h[2] -= up * rise * h[2];
+    if (light > 0) {
+        float towards[3];
+        tpc_find_light(g, bud->position, towards);
+        for (int k = 0; k < 3; k++) h[k] += (k == 1 ? tpc_rise : 1) * light * towards[k];
+    }
     if (o->sag != 0) {
         const float at = bud->along + 0.5f * length / bud->length;
         const float fall = o->sag * degree * 2 * at * (length / bud->length);

@@ -9,7 +9,7 @@
 static const char tpc_fresh[] =
     "flare 1.6\n"
     "envelope free\n" "crown_base 0\n" "crown_top 1\n" "crown_width 1\n" "shade 0\n"
-    "clearance 1.2\n"
+    "phototropism 0\n" "clearance 1.2\n"
     "stiffness 1\n"
     "leaf_shape oval\n" "leaf_count 24\n" "leaf_size 0.3\n" "cloud_kind round\n" "cloud 0.5\n"
     "cloud_flat 0.8\n"
@@ -35,7 +35,7 @@ static const char tpc_fresh[] =
     "leaves_start 0.2\n";
 
 static const char tpc_oak[] =
-    "name oak\n" "flare 1.7\n" "stiffness 1.4\n"
+    "name oak\n" "phototropism 0.2\n" "flare 1.7\n" "stiffness 1.4\n"
     "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 1.45\n"
     "leaf_shape lobed\n" "leaf_count 28\n" "leaf_size 0.42\n" "cloud 1.2\n" "cloud_flat 0.8\n"
     "leaf_color 0.29 0.4 0.13\n" "bark_color 0.4 0.35 0.29\n"
@@ -59,7 +59,7 @@ static const char tpc_oak[] =
     "wander 16\n" "leaves 0.5\n";
 
 static const char tpc_beech[] =
-    "name beech\n" "flare 1.8\n" "stiffness 1.2\n"
+    "name beech\n" "phototropism 0.15\n" "flare 1.8\n" "stiffness 1.2\n"
     "envelope ellipsoid\n" "crown_base 0.06\n" "crown_top 1.08\n" "crown_width 0.95\n"
     "leaf_shape oval\n" "leaf_count 48\n" "leaf_size 0.36\n" "cloud_kind layers\n" "cloud 1.25\n"
     "cloud_flat 0.5\n"
@@ -80,7 +80,7 @@ static const char tpc_beech[] =
     "wander 10\n" "sag 15\n" "flatten 0.5\n" "leaves 0.6\n" "leaves_start 0.2\n";
 
 static const char tpc_maple[] =
-    "name maple\n" "flare 1.5\n"
+    "name maple\n" "phototropism 0.2\n" "flare 1.5\n"
     "envelope ellipsoid\n" "crown_base 0.12\n" "crown_top 1.1\n" "crown_width 0.85\n"
     "leaf_shape palmate\n" "leaf_count 24\n" "leaf_size 0.42\n" "cloud 1\n" "cloud_flat 0.85\n"
     "leaf_color 0.74 0.4 0.12\n" "bark_color 0.42 0.38 0.33\n"
@@ -100,7 +100,7 @@ static const char tpc_maple[] =
     "wander 10\n" "tropism 0.08\n" "leaves 0.7\n" "leaves_start 0.2\n";
 
 static const char tpc_birch[] =
-    "name birch\n" "flare 1.3\n" "stiffness 0.7\n"
+    "name birch\n" "phototropism 0.1\n" "flare 1.3\n" "stiffness 0.7\n"
     "envelope ellipsoid\n" "crown_base 0.1\n" "crown_top 1.12\n" "crown_width 0.5\n"
     "leaf_shape heart\n" "leaf_count 12\n" "leaf_size 0.5\n" "cloud 0.75\n" "cloud_flat 1.3\n"
     "leaf_color 0.4 0.52 0.16\n" "bark_kind lenticels\n" "bark_color 0.85 0.83 0.79\n"
@@ -136,7 +136,7 @@ static const char tpc_poplar[] =
     "angle_base 32\n" "angle_top 25\n" "wander 7\n" "tropism 0.12\n" "leaves 0.6\n";
 
 static const char tpc_willow[] =
-    "name willow\n" "flare 1.6\n" "stiffness 0.6\n"
+    "name willow\n" "phototropism 0.1\n" "flare 1.6\n" "stiffness 0.6\n"
     "envelope ellipsoid\n" "crown_base 0\n" "crown_top 1.05\n" "crown_width 1.6\n"
     "leaf_shape lance\n" "leaf_count 16\n" "leaf_size 0.9\n" "cloud_kind strips\n" "cloud 1\n"
     "cloud_flat 2\n"
@@ -157,7 +157,7 @@ static const char tpc_willow[] =
     "wander 5\n" "tropism -0.3\n" "leaves 0.85\n" "leaves_start 0\n";
 
 static const char tpc_almond[] =
-    "name almond\n" "flare 1.4\n"
+    "name almond\n" "phototropism 0.1\n" "flare 1.4\n"
     "leaf_shape blossom\n" "leaf_count 44\n" "leaf_size 0.28\n" "cloud 0.42\n" "cloud_flat 0.9\n"
     "leaf_color 0.94 0.76 0.8\n" "bark_kind lenticels\n" "bark_color 0.3 0.25 0.22\n"
     "order 0\n" "length 5.5\n" "radius 0.026\n" "taper 0.06\n" "segments 14\n"
@@ -174,7 +174,7 @@ static const char tpc_almond[] =
     "angle_base 45\n" "angle_top 40\n" "wander 12\n" "tropism 0.06\n" "leaves 0.6\n";
 
 static const char tpc_pine[] =
-    "name pine\n" "flare 1.4\n"
+    "name pine\n" "phototropism 0.15\n" "flare 1.4\n"
     "leaf_shape needle\n" "leaf_count 32\n" "leaf_size 0.66\n" "cloud_kind shoots\n" "cloud 0.95\n"
     "cloud_flat 0.32\n"
     "leaf_color 0.23 0.335 0.185\n" "bark_kind plates\n" "bark_color 0.55 0.36 0.24\n"
@@ -211,7 +211,7 @@ static const char tpc_spruce[] =
     "wander 6\n" "sag 25\n" "flatten 0.7\n" "leaves 0.8\n" "leaves_start 0.1\n";
 
 static const char tpc_dead[] =
-    "name dead\n" "flare 1.7\n" "stiffness 2\n" "leaf_count 0\n"
+    "name dead\n" "phototropism 0.1\n" "flare 1.7\n" "stiffness 2\n" "leaf_count 0\n"
     "bark_color 0.5 0.47 0.43\n"
     "order 0\n" "length 9\n" "radius 0.036\n" "taper 0.3\n" "segments 12\n"
     "start 0.3\n" "side 0.55\n" "fork 0.18\n" "fork_angle 28\n" "fork_ratio 0.85\n"

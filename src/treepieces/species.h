@@ -30,6 +30,7 @@ static const tpc_field tpc_fields[] = {
     TPC_FIELD(crown_top, TPC_REAL, 1, 0.01f, 3),
     TPC_FIELD(crown_width, TPC_REAL, 1, 0.01f, 10),
     TPC_FIELD(shade, TPC_REAL, 1, 0, 1e6f),
+    TPC_FIELD(phototropism, TPC_REAL, 1, 0, 1),
     TPC_FIELD(clearance, TPC_REAL, 1, 0, 10),
     TPC_FIELD(stiffness, TPC_REAL, 1, 0.01f, 100),
     TPC_FIELD(leaf_shape, TPC_LEAF, 1, 0, TREEPIECES_LEAF_COMPOUND),

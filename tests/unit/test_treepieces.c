@@ -397,6 +397,44 @@ static void test_pruning(void **state) {
     treepieces_forest_free(dark);
 }
 
+/* The mean part of the pieces of a tree that lies above one of them, in a column of 1 m^2. */
+static double mean_shade(const treepieces_forest *f) {
+    enum { SIDE = 80 }; /* metres; no oak is as wide */
+    float *bones = make_bones(f, NULL);
+    double pairs = 0;
+    for (uint32_t i = 0; i < f->node_count; i++)
+        for (uint32_t j = 0; j < f->node_count; j++) {
+            const float *a = bones + TREEPIECES_BONE * (size_t)i, *b = bones + TREEPIECES_BONE * (size_t)j;
+            const int same = (int)(a[3] + SIDE) == (int)(b[3] + SIDE) && (int)(a[11] + SIDE) == (int)(b[11] + SIDE);
+            pairs += same && b[7] > a[7];
+        }
+    free(bones);
+    return pairs / f->node_count / f->node_count;
+}
+
+/* Branches turn to the light: fewer pieces lie above each other, and the tree is as high. */
+static void test_phototropism(void **state) {
+    (void)state;
+    treepieces_species dull = oak, keen = oak;
+    treepieces_forest_desc d = describe(1, 1200);
+    double in_dull = 0, in_keen = 0;
+    dull.phototropism = 0;
+    keen.phototropism = 0.4f;
+    for (d.seed = 1; d.seed <= 8; d.seed++) {
+        d.species = &dull;
+        treepieces_forest *f = grow(&d);
+        in_dull += mean_shade(f);
+        const float height = f->trees[0].height;
+        treepieces_forest_free(f);
+        d.species = &keen;
+        f = grow(&d);
+        in_keen += mean_shade(f);
+        assert_true(f->trees[0].height > 0.85f * height && f->trees[0].height < 1.15f * height);
+        treepieces_forest_free(f);
+    }
+    assert_true(in_keen < 0.85 * in_dull);
+}
+
 /* ---- poses and wind ------------------------------------------------------------------------ */
 
 /* A bone is a rotation times diag(radius, length, radius), at the position that the parent's gives. */
@@ -838,6 +876,7 @@ int main(void) {
         cmocka_unit_test(test_far_away),
         cmocka_unit_test(test_seeds),     cmocka_unit_test(test_budget),
         cmocka_unit_test(test_rules),     cmocka_unit_test(test_pruning),
+        cmocka_unit_test(test_phototropism),
         cmocka_unit_test(test_bones),     cmocka_unit_test(test_pose_alone),
         cmocka_unit_test(test_wind),
         cmocka_unit_test(test_no_unison), cmocka_unit_test(test_gusts),
