@@ -327,6 +327,19 @@ struct card_data {
     vec4 center, right, up, normal; /* w: layer, species, -, - */
 };
 layout(std430, binding = 6) readonly buffer card_buffer { card_data cards[]; };
+
+/* The light of a card, from its own direction: the sun's, and what comes through when that is behind it */
+float light_on(vec3 normal) {
+    return 0.82 + 0.36 * clamp(0.35 + 0.65 * dot(normal, frame.sun.xyz), 0.0, 1.0) +
+           0.2 * max(0.0, dot(frame.forward.xyz, frame.sun.xyz));
+}
+#endif
+
+#if defined(CARD_FRAGMENT) || defined(NEAR_FRAGMENT)
+/* the middle of a cloud is darker */
+float depth_light(vec3 from_middle) {
+    return 0.75 + 0.25 * min(1.0, dot(from_middle, from_middle));
+}
 #endif
 
 #ifdef CARD_VERTEX
@@ -345,8 +358,7 @@ void main() {
     card_at = center + side.x * right + side.y * up;
     card_leaf = vec2(side.x, -side.y) * 0.5 + 0.5;
     card_what = ivec2(c.center.w, c.right.w);
-    card_light = 0.82 + 0.36 * clamp(0.35 + 0.65 * dot(c.normal.xyz, frame.sun.xyz), 0.0, 1.0) +
-                 0.2 * max(0.0, dot(frame.forward.xyz, frame.sun.xyz));
+    card_light = light_on(c.normal.xyz);
     gl_Position = is_edge_on ? vec4(2.0) : vec4(card_at.xy, -card_at.z * 0.5, 1.0);
 }
 #endif
@@ -387,7 +399,7 @@ layout(location = 1) out float depth;
 void main() {
     vec4 texel = texelFetch(leaves, ivec3(leaf * vec2(textureSize(leaves, 0).xy), species), 0);
     if (texel.a < 0.5) discard;
-    color = vec4(min(texel.rgb * lit * (0.75 + 0.25 * min(1.0, dot(at, at))), 1.0), 1.0);
+    color = vec4(min(texel.rgb * lit * depth_light(at), 1.0), 1.0);
     depth = at.z;
 }
 #endif
@@ -507,7 +519,7 @@ void main() {
 
 #ifdef NEAR_VERTEX
 layout(std430, binding = 7) readonly buffer near_buffer { uvec2 near[]; }; /* cluster, card */
-out vec3 place, normal;
+out vec3 place, normal, from_middle;
 out vec2 leaf;
 flat out vec3 tint, center;
 flat out float own_light;
@@ -524,17 +536,18 @@ void main() {
     at += 0.25 * length(card.up.xyz) * (0.5 + 0.5 * side.y) * /* it hangs on its twig below */
           (flutter.x * card.normal.xyz + 0.4 * flutter.y * normalize(card.right.xyz));
     place = center + radius * at;
+    from_middle = at;
     leaf = vec2(side.x, -side.y) * 0.5 + 0.5;
     species = int(card.right.w);
     tint = tint_of(looks[c.x], c.w);
     normal = 1.2 * crown_normal(center, radius) + 0.55 * at + vec3(0.0, 0.25, 0.0);
-    own_light = 0.82 + 0.36 * clamp(0.35 + 0.65 * dot(card.normal.xyz, frame.sun.xyz), 0.0, 1.0);
+    own_light = light_on(card.normal.xyz);
     gl_Position = frame.view_projection * vec4(place, 1.0);
 }
 #endif
 
 #ifdef NEAR_FRAGMENT
-in vec3 place, normal;
+in vec3 place, normal, from_middle;
 in vec2 leaf;
 flat in vec3 tint, center;
 flat in float own_light;
@@ -547,7 +560,7 @@ void main() {
     vec3 face = normalize(cross(dFdx(place), dFdy(place)));
     float turned = abs(dot(face, normalize(place - frame.eye.xyz)));
     if (texel.a < 0.5 || turned < 0.3 * hash(gl_FragCoord.yx) || !shows_cards(center)) discard;
-    vec3 albedo = pow(texel.rgb * own_light, vec3(2.2)) * tint;
+    vec3 albedo = pow(min(texel.rgb * own_light * depth_light(from_middle), 1.0), vec3(2.2)) * tint;
     color = seen(albedo * leaf_light(place, normalize(normal)), place);
 }
 #endif

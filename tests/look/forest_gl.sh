@@ -91,6 +91,26 @@ near_leaves() {
 }
 check "forest_gl: leaves near the camera are cards, with one draw call more" near_leaves
 
+# cards and impostors of the same leaves are as bright: where they meet, no ring shows
+same_light() {
+    for species in oak birch; do
+        for metres in 0 1000; do
+            "$forest" --shaders "$shaders" --species $species --count 1 --pieces 600 --size 400x336 --smooth 2 \
+                --orbit 30,5,25 --at 0,9,0 --cards $metres --headless n$metres.png >out.log 2>err.log ||
+                { cat err.log; return 1; }
+        done
+        PYTHONPATH=$kit python3 - $species <<'END' || return 1
+import sys
+from png import Png, need
+far, near = [[v for row in Png(f).lines for v in row] for f in ("n0.png", "n1000.png")]
+other = [(a, b) for a, b in zip(far, near) if abs(a - b) > 4]
+means = [sum(v) / len(other) for v in zip(*other)]
+need(len(other) > 2000 and abs(means[0] - means[1]) < 6, sys.argv[1], len(other), means)
+END
+    done
+}
+check "forest_gl: cards are as bright as the impostors that they replace" same_light
+
 frames() {
     draw --headless f%02d.png --frames 3 --wind 9 || { cat err.log; return 1; }
     [ -s f00.png ] && [ -s f02.png ] && [ ! -e f03.png ] && ! cmp -s f00.png f02.png
