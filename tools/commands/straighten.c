@@ -187,7 +187,10 @@ static int run_job(straighten_job *j, int argc, char **argv) {
 
 static int run_straighten(int argc, char **argv) {
     straighten_job *j = (straighten_job *)new_array(1, sizeof *j);
-    if (!j) return CLI_FAILED;
+    if (!j) {
+        fprintf(stderr, "texkit straighten: out of memory\n");
+        return CLI_FAILED;
+    }
     const int status = run_job(j, argc, argv);
     for (int m = 0; m <= MAX_STRAIGHT_MAPS; m++) image_free(&j->pictures[m]);
     image_free(&j->mask);

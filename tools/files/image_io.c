@@ -35,16 +35,20 @@ unsigned char *file_read(const char *path, size_t *size) {
     FILE *file = is_stdin ? stdin : fopen(path, "rb");
     unsigned char *bytes = NULL;
     size_t capacity = 1 << 16, n = 0;
+    int error = 0;
     if (!file) return NULL;
-    for (;;) {
+    for (; !error; capacity *= 2) {
         unsigned char *grown = (unsigned char *)realloc(bytes, capacity);
-        if (!grown) break;
+        if (!grown) {
+            error = ENOMEM;
+            break;
+        }
         bytes = grown;
         n += fread(bytes + n, 1, capacity - n, file);
-        if (n < capacity || capacity > INT_MAX / 2) break;
-        capacity *= 2;
+        if (ferror(file)) error = errno;
+        if (n < capacity) break;
+        if (capacity > INT_MAX / 2) error = EFBIG;
     }
-    int error = ferror(file) ? errno : bytes == NULL ? ENOMEM : n == capacity ? EFBIG : 0;
     if (!is_stdin) fclose(file);
     if (error) {
         free(bytes);
