@@ -32,6 +32,7 @@ row() {
 }
 row angle beech 'order 1\nangle_base VALUE\nangle_top VALUE' --bare 30 60 90
 row tropism oak 'order 1\ntropism VALUE\norder 2\ntropism VALUE' --bare -0.15 0 0.2
+row light maple 'phototropism VALUE' '' 0 0.2 0.6
 row wander oak 'order 0\nwander VALUE\norder 1\nwander VALUE\norder 2\nwander VALUE' --bare 0 15 35
 row orders maple 'order_count VALUE' --bare 2 3 5
 row envelope beech 'envelope VALUE\ncrown_width 0.8' '' cone ellipsoid cylinder
