@@ -3656,7 +3656,11 @@ static double tmr_scale_at(const tmr_surface *s, const tmr_place *at) {
 
 /* ---- the work ----------------------------------------------------------------------------- */
 
-enum { TMR_CHUNK = 2048 }; /* vertices or triangles per parallel task; does not change results */
+enum {
+    TMR_CHUNK = 2048, /* vertices or triangles per parallel task; does not change results */
+    TMR_TICK = 50000, /* ours: progress is reported after the work of moving so many vertices */
+    TMR_TICK_TRIAL = 20 /* ours: so many are what trying something at one edge takes */
+};
 
 typedef struct tmr_work {
     const tmr_surface *s;
@@ -3677,8 +3681,18 @@ typedef struct tmr_work {
     uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
+    int64_t ticks;     /* work since progress was reported: tmr_tick                            */
     int splinters;     /* of collapsing: also the short sides of much longer triangles          */
 } tmr_work;
+
+/* Report progress if the work of moving TMR_TICK vertices was done since the last time: small meshes need
+   no reports, and of large ones no pass is too long to be cancelled. Non-zero: cancelled, stop. */
+static int tmr_tick(tmr_work *w, int32_t vertices) {
+    w->ticks += vertices;
+    if (w->ticks < TMR_TICK) return 0;
+    w->ticks = 0;
+    return txm_progress(w->env, 0, "relax"); /* the fraction stays at the highest so far */
+}
 
 /* a face of the surface at the vertex */
 static int32_t tmr_face_of(const tmr_work *w, int32_t v) {
@@ -5414,9 +5428,10 @@ static void tmr_level_turns(tmr_level *level) {
 
 /* Directions: each node takes the mean of its neighbours (Gauss and Seidel), which makes the field
    as smooth as it can be, with its magnitude going to 0 where arms do not fit. */
-static void tmr_smooth_directions(tmr_level *level, int sweeps) {
+static txm_status tmr_smooth_directions(tmr_work *work, tmr_level *level, int sweeps) {
     for (int sweep = 0; sweep < sweeps; sweep++) {
         double most = 0;
+        if (tmr_tick(work, level->count)) return TXM_CANCELLED;
         for (int32_t i = 0; i < level->count; i++) {
             double re = 0, im = 0, sum = 0;
             if (level->fixed[i] == 1) continue;
@@ -5440,9 +5455,10 @@ static void tmr_smooth_directions(tmr_level *level, int sweeps) {
             }
         }
     }
+    return TXM_OK;
 }
 
-static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
+static txm_status tmr_solve_directions(tmr_work *w, tmr_fields *f, uint64_t seed) {
     tmr_level *top = &f->level[f->count - 1];
     txm_rng rng = txm_rng_make(seed, 1);
     for (int32_t i = 0; i < top->count; i++) {
@@ -5453,6 +5469,7 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
     }
     for (int l = f->count - 1; l >= 0; l--) {
         tmr_level *level = &f->level[l];
+        if (tmr_tick(w, level->count)) return TXM_CANCELLED;
         tmr_level_turns(level);
         if (l < f->count - 1) {
             const tmr_level *up = &f->level[l + 1];
@@ -5465,7 +5482,9 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
                 tmr_complex_mul(up->z[j], six, level->z[i]);
             }
         }
-        tmr_smooth_directions(level, l == f->count - 1 ? 100 : l == 0 ? 5 : 10);
+        const txm_status status =
+            tmr_smooth_directions(w, level, l == f->count - 1 ? 100 : l == 0 ? 5 : 10);
+        if (status != TXM_OK) return status;
     }
     for (int l = 0; l < f->count; l++) { /* x becomes one of the arms */
         tmr_level *level = &f->level[l];
@@ -5476,6 +5495,7 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
             level->x[i] = txm_d3_add(txm_d3_scale(level->x[i], r[0]), txm_d3_scale(y, r[1]));
         }
     }
+    return TXM_OK;
 }
 
 /* ---- lattice points ----------------------------------------------------------------------- */
@@ -5565,9 +5585,10 @@ static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, in
     *b = txm_d3_mad(txm_d3_mad(from[1], x[1], best >> 2 & 1), y[1], best >> 3);
 }
 
-static void tmr_smooth_points(tmr_level *level, int sweeps) {
+static txm_status tmr_smooth_points(tmr_work *w, tmr_level *level, int sweeps) {
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int32_t i = 0; i < level->count; i++) {
+            if (tmr_tick(w, 1)) return TXM_CANCELLED;
             txm_dvec3 q = level->q[i];
             double sum = 0;
             if (level->fixed[i]) continue;
@@ -5586,9 +5607,10 @@ static void tmr_smooth_points(tmr_level *level, int sweeps) {
                                                 level->scale[i], level->p[i]);
         }
     }
+    return TXM_OK;
 }
 
-static void tmr_solve_points(tmr_fields *f) {
+static txm_status tmr_solve_points(tmr_work *w, tmr_fields *f) {
     for (int l = f->count - 1; l >= 0; l--) {
         tmr_level *level = &f->level[l];
         if (l < f->count - 1) {
@@ -5602,8 +5624,10 @@ static void tmr_solve_points(tmr_fields *f) {
                                                 level->scale[i], level->p[i]);
             }
         }
-        tmr_smooth_points(level, l == 0 ? 3 : 6);
+        const txm_status status = tmr_smooth_points(w, level, l == 0 ? 3 : 6);
+        if (status != TXM_OK) return status;
     }
+    return TXM_OK;
 }
 
 static txm_status tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
@@ -5662,6 +5686,7 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     if (!pairs || !room) return TXM_OUT_OF_MEMORY;
+    if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         w->bad[v] = 1;
         w->moved[v] = f->node[v] >= 0 ? f->level[0].q[f->node[v]] : m->p[v];
@@ -5686,6 +5711,7 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
         for (size_t i = 0; i < count; i++) {
             int32_t c = (int32_t)pairs[i].value;
             if (m->vertex[c] < 0) continue;
+            if (tmr_tick(w, 1)) return TXM_CANCELLED;
             const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             if (tmr_is_ghost(m, a) || tmr_is_ghost(m, b)) continue;
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);
@@ -5781,6 +5807,7 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
                                           (m->edge[c] ? 2000 : 0));
             pairs[count++].value = (uint32_t)c;
         }
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         txm_sort_pairs(pairs, room, count);
         memset(w->bad, 0, (size_t)m->vertex_count);
         int32_t done = 0;
@@ -5801,10 +5828,16 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
         /* relax where something was changed */
         memcpy(w->mask_room, w->bad, (size_t)m->vertex_count);
         w->mask = pass % 4 == 3 ? NULL : w->mask_room;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         tmr_flip_valences(w, 2, 0.4);
-        for (int k = 0; k < relaxations; k++) tmr_relax(w);
+        for (int k = 0; k < relaxations; k++) {
+            if (tmr_tick(w, m->live)) return TXM_CANCELLED;
+            tmr_relax(w);
+        }
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         tmr_flip_delaunay(w, 2);
         w->mask = NULL;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         if (done == 0 && pass >= 40) break;
         idle = done ? 0 : idle + 1;
         if (idle == TMR_IDLE) { /* go on to what allows more */
@@ -6276,7 +6309,7 @@ static int tmr_try_insertions(tmr_defects *d, int32_t c) {
 }
 
 /* One pass over the edges of which an end or opposite vertex has changed. Returns how many steps were
-   taken. */
+   taken; -1: cancelled. */
 static int32_t tmr_defect_pass(tmr_defects *d) {
     tmr_work *w = d->w;
     tmr_mesh *m = &w->m;
@@ -6294,6 +6327,7 @@ static int32_t tmr_defect_pass(tmr_defects *d) {
             changed |= d->was[end[k]] | w->mask_room[end[k]];
             loose += tmr_kind_of(m, end[k]) == TRIMESH_FREE;
         }
+        if (changed && tmr_tick(w, TMR_TICK_TRIAL)) return -1;
         if (!changed || loose < 2 || tmr_is_ghost(m, end[2]) || tmr_is_ghost(m, end[3])) continue;
         const int is_free =
             tmr_kind_of(m, end[0]) == TRIMESH_FREE && tmr_kind_of(m, end[1]) == TRIMESH_FREE;
@@ -6325,7 +6359,9 @@ static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scrat
     const txm_status status = tmr_defects_begin(&d, w, target, scratch);
     for (int pass = 0; pass < TMR_DEFECT_PASSES && status == TXM_OK; pass++) {
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
-        if (tmr_defect_pass(&d) == 0) break;
+        const int32_t steps = tmr_defect_pass(&d);
+        if (steps < 0) return TXM_CANCELLED;
+        if (steps == 0) break;
     }
     return status;
 }
@@ -6349,6 +6385,7 @@ static txm_status tmr_count_beside_defects(tmr_work *w, int32_t target, txm_aren
             if (tmr_kind_of(m, m->vertex[tmr_next(c)]) != TRIMESH_FREE ||
                 tmr_kind_of(m, m->vertex[tmr_prev(c)]) != TRIMESH_FREE)
                 continue;
+            if (tmr_tick(w, TMR_TICK_TRIAL)) return TXM_CANCELLED;
             d.price = price / (missing < 0 ? -missing : missing);
             if (missing < 0) tmr_try_removal(&d, c);
             else tmr_try_insertions(&d, c);
@@ -6420,12 +6457,14 @@ static int tmr_try_turn(tmr_work *w, tmr_patch *patch, int32_t c) {
     return tmr_patch_judge(w, patch, 0);
 }
 
+/* One pass over the mesh. Returns how many triangles were mended; -1: cancelled. */
 static int32_t tmr_sliver_pass(tmr_work *w, tmr_patch *patch, int count_too, int32_t *budget) {
     const int32_t faces = w->m.face_count;
     int32_t steps = 0;
     for (int32_t f = 0; f < faces && *budget > 0; f++) {
         if (!tmr_is_sliver(w, f)) continue;
         --*budget;
+        if (tmr_tick(w, 10 * TMR_TICK_TRIAL)) return -1; /* each way of mending it is tried */
         int done = 0;
         for (int32_t c = 3 * f; c < 3 * f + 3 && !done; c++) done = tmr_try_turn(w, patch, c);
         for (int32_t c = 3 * f; c < 3 * f + 3 && !done && count_too; c++) {
@@ -6448,8 +6487,12 @@ static txm_status tmr_mend_slivers(tmr_work *w, int count_too, txm_arena *scratc
     memset(w->bad, 0, (size_t)m->vertex_limit);
     memset(w->flag, 0, (size_t)m->face_limit);
     int32_t budget = m->live / TMR_SLIVER_SHARE + 20;
-    for (int pass = 0; pass < TMR_SLIVER_PASSES; pass++)
-        if (tmr_sliver_pass(w, patch, count_too, &budget) == 0) break;
+    for (int pass = 0; pass < TMR_SLIVER_PASSES; pass++) {
+        const int32_t steps = tmr_sliver_pass(w, patch, count_too, &budget);
+        if (steps < 0) return TXM_CANCELLED;
+        if (steps == 0) break;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
+    }
     return TXM_OK;
 }
 
@@ -6748,10 +6791,13 @@ static txm_status tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
     if (!w->height || !w->limit) return TXM_OUT_OF_MEMORY;
     for (int round = 0; round < rounds; round++) {
         txm_parallel_for(w->env, (w->m.face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_height_chunk, w);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         const int chunks = (w->m.vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
         if (round == 0) txm_parallel_for(w->env, chunks, tmr_limit_chunk, w);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         txm_parallel_for(w->env, chunks, tmr_fit_chunk, w);
         tmr_settle(w);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
@@ -6973,11 +7019,14 @@ static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int wh
     const double slack = rim ? TMR_TOUCH : 0;
     tmr_cells g;
     *found = 0;
+    if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     const txm_status status = tmr_cells_make(w, nearby, &g, scratch);
     if (status != TXM_OK) return status;
+    if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
+        if (tmr_tick(w, 1)) return TXM_CANCELLED;
         for (size_t x = i; x < end; x++) {
             const int32_t f = (int32_t)g.entry[x].value;
             txm_dvec3 low, high;
@@ -7131,7 +7180,7 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
 #define TMR_FAIR 0.85 /* ours: quality of triangles that gets no further attention */
 
 /* More rounds of relaxation and flips around the triangles that are still poor. */
-static void tmr_improve_spots(tmr_work *w, int rounds) {
+static txm_status tmr_improve_spots(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     w->pull = w->step = 1;
     for (int round = 0; round < rounds; round++) {
@@ -7152,9 +7201,12 @@ static void tmr_improve_spots(tmr_work *w, int rounds) {
         w->mask = w->mask_room;
         for (int k = 0; k < 3; k++) tmr_relax(w);
         w->mask = NULL;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         tmr_flip_valences(w, 2, 0.4);
         tmr_flip_delaunay(w, 2);
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     }
+    return TXM_OK;
 }
 
 enum { TMR_SPOT_ROUNDS = 16 };
@@ -7180,6 +7232,10 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
                                      &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
+        if (tmr_tick(w, w->m.live)) {
+            status = TXM_CANCELLED;
+            break;
+        }
         const long turned = tmr_count_inverted(w, &doubtful);
         const long score = 1000 * (crossings + turned) + doubtful;
         if (best < 0 || score < best) {
@@ -7974,8 +8030,12 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
         /* the fraction stays at the highest so far: tmr_job_report */
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
-        for (int k = 0; k < effort->relaxations; k++) tmr_relax(w);
+        for (int k = 0; k < effort->relaxations; k++) {
+            tmr_relax(w);
+            if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
+        }
         tmr_flip_delaunay(w, 3);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         tmr_flip_valences(w, 3, TMR_FAIR_FLIP);
     }
     return TXM_OK;
@@ -7984,7 +8044,7 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
 /* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of
    as many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has
    a few vertices too many: removing vertices improves the pattern, adding some disturbs it. */
-static void tmr_set_spacing(tmr_work *w, int32_t target) {
+static txm_status tmr_set_spacing(tmr_work *w, int32_t target) {
     const double faces = w->m.live_faces;
     w->pull = 0.5;
     w->step = 1;
@@ -7992,19 +8052,20 @@ static void tmr_set_spacing(tmr_work *w, int32_t target) {
     for (int k = 0; k < TMR_SPACING_ROUNDS; k++) {
         tmr_relax(w);
         tmr_flip_delaunay(w, 2);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
     }
     w->length = TMR_LATTICE_SPACING * tmr_ideal_length(w) *
                 sqrt(faces / (faces + 2.0 * (target - w->m.live)));
+    return TXM_OK;
 }
 
 /* Directions, lattice points, and the mesh collapsed onto them. */
 static txm_status tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
     tmr_fields f;
-    const txm_status status = tmr_fields_build(w, &f, arena);
-    if (status != TXM_OK) return status;
-    tmr_solve_directions(&f, seed);
-    tmr_solve_points(&f);
-    return tmr_collapse_lattice(w, &f, arena);
+    txm_status status = tmr_tick(w, w->m.live) ? TXM_CANCELLED : tmr_fields_build(w, &f, arena);
+    if (status == TXM_OK) status = tmr_solve_directions(w, &f, seed);
+    if (status == TXM_OK) status = tmr_solve_points(w, &f);
+    return status == TXM_OK ? tmr_collapse_lattice(w, &f, arena) : status;
 }
 
 /* Turn w->m, a copy of the surface, into a lattice of target vertices. */
@@ -8017,13 +8078,16 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     status = tmr_thin_lines(w, &arena);
     if (status == TXM_OK) {
         tmr_even_lines(w);
-        tmr_set_spacing(w, target);
-        status = tmr_solve_lattice(w, seed, &arena);
+        status = tmr_set_spacing(w, target);
+        if (status == TXM_OK) status = tmr_solve_lattice(w, seed, &arena);
     }
     for (int round = 0; round < TMR_CLEAN_ROUNDS && status == TXM_OK; round++) {
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, TMR_FAIR_FLIP_CLEAN);
-        for (int k = 0; k < 3; k++) tmr_relax(w);
+        for (int k = 0; k < 3; k++) {
+            tmr_relax(w);
+            if (tmr_tick(w, w->m.live)) status = TXM_CANCELLED;
+        }
         tmr_split_long(w, TMR_LONG, TMR_LONG_ON_LINES);
         tmr_collapse_short(w, TMR_SHORT, TMR_SHORT_ON_LINES, TMR_LONGEST, 1);
     }
@@ -8039,7 +8103,7 @@ static txm_status tmr_mend_worst(tmr_work *w, int32_t target, txm_arena *scratch
     int32_t missing;
     txm_status status = tmr_mend_slivers(w, 1, scratch);
     if (status != TXM_OK) return status;
-    tmr_improve_spots(w, 1);
+    if ((status = tmr_improve_spots(w, 1)) != TXM_OK) return status;
     status = tmr_mend_slivers(w, 1, scratch);
     if (status != TXM_OK || w->m.live == target) return status;
     status = tmr_count_beside_defects(w, target, scratch);
@@ -8054,14 +8118,16 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_density);
     if (status == TXM_OK) status = tmr_improve(w, w->s->scale ? &tmr_polish_sizes : &tmr_polish_angles);
     if (status != TXM_OK) return status;
-    tmr_improve_spots(w, 3);
+    if ((status = tmr_improve_spots(w, 3)) != TXM_OK) return status;
     if ((status = tmr_mend_worst(w, target, scratch)) != TXM_OK) return status;
     if (w->m.live != target)
         return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
                                 (uint64_t)w->m.live, (uint64_t)target);
     if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
-    for (int round = 0; round < TMR_FOLD_ROUNDS; round++)
+    for (int round = 0; round < TMR_FOLD_ROUNDS; round++) {
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         if (tmr_open_folds(w, TMR_FOLD_STEP) == 0) break;
+    }
     tmr_return_volume(w);
     return TXM_OK;
 }

@@ -71,6 +71,7 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
                                           (m->edge[c] ? 2000 : 0));
             pairs[count++].value = (uint32_t)c;
         }
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         txm_sort_pairs(pairs, room, count);
         memset(w->bad, 0, (size_t)m->vertex_count);
         int32_t done = 0;
@@ -91,10 +92,16 @@ static txm_status tmr_fix_count(tmr_work *w, int32_t target, int relaxations, tx
         /* relax where something was changed */
         memcpy(w->mask_room, w->bad, (size_t)m->vertex_count);
         w->mask = pass % 4 == 3 ? NULL : w->mask_room;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         tmr_flip_valences(w, 2, 0.4);
-        for (int k = 0; k < relaxations; k++) tmr_relax(w);
+        for (int k = 0; k < relaxations; k++) {
+            if (tmr_tick(w, m->live)) return TXM_CANCELLED;
+            tmr_relax(w);
+        }
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         tmr_flip_delaunay(w, 2);
         w->mask = NULL;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         if (done == 0 && pass >= 40) break;
         idle = done ? 0 : idle + 1;
         if (idle == TMR_IDLE) { /* go on to what allows more */

@@ -95,7 +95,7 @@ static int tmr_try_insertions(tmr_defects *d, int32_t c) {
 }
 
 /* One pass over the edges of which an end or opposite vertex has changed. Returns how many steps were
-   taken. */
+   taken; -1: cancelled. */
 static int32_t tmr_defect_pass(tmr_defects *d) {
     tmr_work *w = d->w;
     tmr_mesh *m = &w->m;
@@ -113,6 +113,7 @@ static int32_t tmr_defect_pass(tmr_defects *d) {
             changed |= d->was[end[k]] | w->mask_room[end[k]];
             loose += tmr_kind_of(m, end[k]) == TRIMESH_FREE;
         }
+        if (changed && tmr_tick(w, TMR_TICK_TRIAL)) return -1;
         if (!changed || loose < 2 || tmr_is_ghost(m, end[2]) || tmr_is_ghost(m, end[3])) continue;
         const int is_free =
             tmr_kind_of(m, end[0]) == TRIMESH_FREE && tmr_kind_of(m, end[1]) == TRIMESH_FREE;
@@ -144,7 +145,9 @@ static txm_status tmr_mend_defects(tmr_work *w, int32_t target, txm_arena *scrat
     const txm_status status = tmr_defects_begin(&d, w, target, scratch);
     for (int pass = 0; pass < TMR_DEFECT_PASSES && status == TXM_OK; pass++) {
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
-        if (tmr_defect_pass(&d) == 0) break;
+        const int32_t steps = tmr_defect_pass(&d);
+        if (steps < 0) return TXM_CANCELLED;
+        if (steps == 0) break;
     }
     return status;
 }
@@ -168,6 +171,7 @@ static txm_status tmr_count_beside_defects(tmr_work *w, int32_t target, txm_aren
             if (tmr_kind_of(m, m->vertex[tmr_next(c)]) != TRIMESH_FREE ||
                 tmr_kind_of(m, m->vertex[tmr_prev(c)]) != TRIMESH_FREE)
                 continue;
+            if (tmr_tick(w, TMR_TICK_TRIAL)) return TXM_CANCELLED;
             d.price = price / (missing < 0 ? -missing : missing);
             if (missing < 0) tmr_try_removal(&d, c);
             else tmr_try_insertions(&d, c);

@@ -280,9 +280,10 @@ static void tmr_level_turns(tmr_level *level) {
 
 /* Directions: each node takes the mean of its neighbours (Gauss and Seidel), which makes the field
    as smooth as it can be, with its magnitude going to 0 where arms do not fit. */
-static void tmr_smooth_directions(tmr_level *level, int sweeps) {
+static txm_status tmr_smooth_directions(tmr_work *work, tmr_level *level, int sweeps) {
     for (int sweep = 0; sweep < sweeps; sweep++) {
         double most = 0;
+        if (tmr_tick(work, level->count)) return TXM_CANCELLED;
         for (int32_t i = 0; i < level->count; i++) {
             double re = 0, im = 0, sum = 0;
             if (level->fixed[i] == 1) continue;
@@ -306,9 +307,10 @@ static void tmr_smooth_directions(tmr_level *level, int sweeps) {
             }
         }
     }
+    return TXM_OK;
 }
 
-static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
+static txm_status tmr_solve_directions(tmr_work *w, tmr_fields *f, uint64_t seed) {
     tmr_level *top = &f->level[f->count - 1];
     txm_rng rng = txm_rng_make(seed, 1);
     for (int32_t i = 0; i < top->count; i++) {
@@ -319,6 +321,7 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
     }
     for (int l = f->count - 1; l >= 0; l--) {
         tmr_level *level = &f->level[l];
+        if (tmr_tick(w, level->count)) return TXM_CANCELLED;
         tmr_level_turns(level);
         if (l < f->count - 1) {
             const tmr_level *up = &f->level[l + 1];
@@ -331,7 +334,9 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
                 tmr_complex_mul(up->z[j], six, level->z[i]);
             }
         }
-        tmr_smooth_directions(level, l == f->count - 1 ? 100 : l == 0 ? 5 : 10);
+        const txm_status status =
+            tmr_smooth_directions(w, level, l == f->count - 1 ? 100 : l == 0 ? 5 : 10);
+        if (status != TXM_OK) return status;
     }
     for (int l = 0; l < f->count; l++) { /* x becomes one of the arms */
         tmr_level *level = &f->level[l];
@@ -342,6 +347,7 @@ static void tmr_solve_directions(tmr_fields *f, uint64_t seed) {
             level->x[i] = txm_d3_add(txm_d3_scale(level->x[i], r[0]), txm_d3_scale(y, r[1]));
         }
     }
+    return TXM_OK;
 }
 
 /* ---- lattice points ----------------------------------------------------------------------- */
@@ -431,9 +437,10 @@ static void tmr_closest_pair(const tmr_level *level, int32_t i, txm_dvec3 qi, in
     *b = txm_d3_mad(txm_d3_mad(from[1], x[1], best >> 2 & 1), y[1], best >> 3);
 }
 
-static void tmr_smooth_points(tmr_level *level, int sweeps) {
+static txm_status tmr_smooth_points(tmr_work *w, tmr_level *level, int sweeps) {
     for (int sweep = 0; sweep < sweeps; sweep++) {
         for (int32_t i = 0; i < level->count; i++) {
+            if (tmr_tick(w, 1)) return TXM_CANCELLED;
             txm_dvec3 q = level->q[i];
             double sum = 0;
             if (level->fixed[i]) continue;
@@ -452,9 +459,10 @@ static void tmr_smooth_points(tmr_level *level, int sweeps) {
                                                 level->scale[i], level->p[i]);
         }
     }
+    return TXM_OK;
 }
 
-static void tmr_solve_points(tmr_fields *f) {
+static txm_status tmr_solve_points(tmr_work *w, tmr_fields *f) {
     for (int l = f->count - 1; l >= 0; l--) {
         tmr_level *level = &f->level[l];
         if (l < f->count - 1) {
@@ -468,8 +476,10 @@ static void tmr_solve_points(tmr_fields *f) {
                                                 level->scale[i], level->p[i]);
             }
         }
-        tmr_smooth_points(level, l == 0 ? 3 : 6);
+        const txm_status status = tmr_smooth_points(w, level, l == 0 ? 3 : 6);
+        if (status != TXM_OK) return status;
     }
+    return TXM_OK;
 }
 
 static txm_status tmr_fields_build(const tmr_work *w, tmr_fields *f, txm_arena *arena) {
@@ -528,6 +538,7 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
     txm_pair *pairs = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     txm_pair *room = (txm_pair *)txm_arena_alloc(scratch, most, sizeof(txm_pair));
     if (!pairs || !room) return TXM_OUT_OF_MEMORY;
+    if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     for (int32_t v = 0; v < m->vertex_count; v++) {
         w->bad[v] = 1;
         w->moved[v] = f->node[v] >= 0 ? f->level[0].q[f->node[v]] : m->p[v];
@@ -552,6 +563,7 @@ static txm_status tmr_collapse_lattice(tmr_work *w, const tmr_fields *f, txm_are
         for (size_t i = 0; i < count; i++) {
             int32_t c = (int32_t)pairs[i].value;
             if (m->vertex[c] < 0) continue;
+            if (tmr_tick(w, 1)) return TXM_CANCELLED;
             const int32_t a = m->vertex[tmr_next(c)], b = m->vertex[tmr_prev(c)];
             if (tmr_is_ghost(m, a) || tmr_is_ghost(m, b)) continue;
             const double spacing = 0.5 * w->length * (w->size[a] + (double)w->size[b]);

@@ -50,8 +50,12 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
         /* the fraction stays at the highest so far: tmr_job_report */
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
-        for (int k = 0; k < effort->relaxations; k++) tmr_relax(w);
+        for (int k = 0; k < effort->relaxations; k++) {
+            tmr_relax(w);
+            if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
+        }
         tmr_flip_delaunay(w, 3);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         tmr_flip_valences(w, 3, TMR_FAIR_FLIP);
     }
     return TXM_OK;
@@ -60,7 +64,7 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
 /* Even out the resampled copy a little, and set the lattice spacing for so many vertices: that of
    as many equilateral triangles on the area there is, times TMR_LATTICE_SPACING. So the lattice has
    a few vertices too many: removing vertices improves the pattern, adding some disturbs it. */
-static void tmr_set_spacing(tmr_work *w, int32_t target) {
+static txm_status tmr_set_spacing(tmr_work *w, int32_t target) {
     const double faces = w->m.live_faces;
     w->pull = 0.5;
     w->step = 1;
@@ -68,19 +72,20 @@ static void tmr_set_spacing(tmr_work *w, int32_t target) {
     for (int k = 0; k < TMR_SPACING_ROUNDS; k++) {
         tmr_relax(w);
         tmr_flip_delaunay(w, 2);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
     }
     w->length = TMR_LATTICE_SPACING * tmr_ideal_length(w) *
                 sqrt(faces / (faces + 2.0 * (target - w->m.live)));
+    return TXM_OK;
 }
 
 /* Directions, lattice points, and the mesh collapsed onto them. */
 static txm_status tmr_solve_lattice(tmr_work *w, uint64_t seed, txm_arena *arena) {
     tmr_fields f;
-    const txm_status status = tmr_fields_build(w, &f, arena);
-    if (status != TXM_OK) return status;
-    tmr_solve_directions(&f, seed);
-    tmr_solve_points(&f);
-    return tmr_collapse_lattice(w, &f, arena);
+    txm_status status = tmr_tick(w, w->m.live) ? TXM_CANCELLED : tmr_fields_build(w, &f, arena);
+    if (status == TXM_OK) status = tmr_solve_directions(w, &f, seed);
+    if (status == TXM_OK) status = tmr_solve_points(w, &f);
+    return status == TXM_OK ? tmr_collapse_lattice(w, &f, arena) : status;
 }
 
 /* Turn w->m, a copy of the surface, into a lattice of target vertices. */
@@ -93,13 +98,16 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     status = tmr_thin_lines(w, &arena);
     if (status == TXM_OK) {
         tmr_even_lines(w);
-        tmr_set_spacing(w, target);
-        status = tmr_solve_lattice(w, seed, &arena);
+        status = tmr_set_spacing(w, target);
+        if (status == TXM_OK) status = tmr_solve_lattice(w, seed, &arena);
     }
     for (int round = 0; round < TMR_CLEAN_ROUNDS && status == TXM_OK; round++) {
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, TMR_FAIR_FLIP_CLEAN);
-        for (int k = 0; k < 3; k++) tmr_relax(w);
+        for (int k = 0; k < 3; k++) {
+            tmr_relax(w);
+            if (tmr_tick(w, w->m.live)) status = TXM_CANCELLED;
+        }
         tmr_split_long(w, TMR_LONG, TMR_LONG_ON_LINES);
         tmr_collapse_short(w, TMR_SHORT, TMR_SHORT_ON_LINES, TMR_LONGEST, 1);
     }
@@ -115,7 +123,7 @@ static txm_status tmr_mend_worst(tmr_work *w, int32_t target, txm_arena *scratch
     int32_t missing;
     txm_status status = tmr_mend_slivers(w, 1, scratch);
     if (status != TXM_OK) return status;
-    tmr_improve_spots(w, 1);
+    if ((status = tmr_improve_spots(w, 1)) != TXM_OK) return status;
     status = tmr_mend_slivers(w, 1, scratch);
     if (status != TXM_OK || w->m.live == target) return status;
     status = tmr_count_beside_defects(w, target, scratch);
@@ -130,14 +138,16 @@ static txm_status tmr_polish(tmr_work *w, int32_t target, txm_arena *scratch) {
     if (status == TXM_OK) status = tmr_improve(w, &tmr_polish_density);
     if (status == TXM_OK) status = tmr_improve(w, w->s->scale ? &tmr_polish_sizes : &tmr_polish_angles);
     if (status != TXM_OK) return status;
-    tmr_improve_spots(w, 3);
+    if ((status = tmr_improve_spots(w, 3)) != TXM_OK) return status;
     if ((status = tmr_mend_worst(w, target, scratch)) != TXM_OK) return status;
     if (w->m.live != target)
         return txm_fail_numbers(w->env, TXM_TOO_SMALL, "reached # vertices instead of #",
                                 (uint64_t)w->m.live, (uint64_t)target);
     if ((status = tmr_fit_surface(w, 2, scratch)) != TXM_OK) return status;
-    for (int round = 0; round < TMR_FOLD_ROUNDS; round++)
+    for (int round = 0; round < TMR_FOLD_ROUNDS; round++) {
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         if (tmr_open_folds(w, TMR_FOLD_STEP) == 0) break;
+    }
     tmr_return_volume(w);
     return TXM_OK;
 }

@@ -66,12 +66,14 @@ static int tmr_try_turn(tmr_work *w, tmr_patch *patch, int32_t c) {
     return tmr_patch_judge(w, patch, 0);
 }
 
+/* One pass over the mesh. Returns how many triangles were mended; -1: cancelled. */
 static int32_t tmr_sliver_pass(tmr_work *w, tmr_patch *patch, int count_too, int32_t *budget) {
     const int32_t faces = w->m.face_count;
     int32_t steps = 0;
     for (int32_t f = 0; f < faces && *budget > 0; f++) {
         if (!tmr_is_sliver(w, f)) continue;
         --*budget;
+        if (tmr_tick(w, 10 * TMR_TICK_TRIAL)) return -1; /* each way of mending it is tried */
         int done = 0;
         for (int32_t c = 3 * f; c < 3 * f + 3 && !done; c++) done = tmr_try_turn(w, patch, c);
         for (int32_t c = 3 * f; c < 3 * f + 3 && !done && count_too; c++) {
@@ -94,8 +96,12 @@ static txm_status tmr_mend_slivers(tmr_work *w, int count_too, txm_arena *scratc
     memset(w->bad, 0, (size_t)m->vertex_limit);
     memset(w->flag, 0, (size_t)m->face_limit);
     int32_t budget = m->live / TMR_SLIVER_SHARE + 20;
-    for (int pass = 0; pass < TMR_SLIVER_PASSES; pass++)
-        if (tmr_sliver_pass(w, patch, count_too, &budget) == 0) break;
+    for (int pass = 0; pass < TMR_SLIVER_PASSES; pass++) {
+        const int32_t steps = tmr_sliver_pass(w, patch, count_too, &budget);
+        if (steps < 0) return TXM_CANCELLED;
+        if (steps == 0) break;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
+    }
     return TXM_OK;
 }
 

@@ -298,10 +298,13 @@ static txm_status tmr_fit_surface(tmr_work *w, int rounds, txm_arena *scratch) {
     if (!w->height || !w->limit) return TXM_OUT_OF_MEMORY;
     for (int round = 0; round < rounds; round++) {
         txm_parallel_for(w->env, (w->m.face_count + TMR_CHUNK - 1) / TMR_CHUNK, tmr_height_chunk, w);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         const int chunks = (w->m.vertex_count + TMR_CHUNK - 1) / TMR_CHUNK;
         if (round == 0) txm_parallel_for(w->env, chunks, tmr_limit_chunk, w);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
         txm_parallel_for(w->env, chunks, tmr_fit_chunk, w);
         tmr_settle(w);
+        if (tmr_tick(w, w->m.live)) return TXM_CANCELLED;
     }
     return TXM_OK;
 }

@@ -220,11 +220,14 @@ static txm_status tmr_count_crossings(tmr_work *w, const uint8_t *nearby, int wh
     const double slack = rim ? TMR_TOUCH : 0;
     tmr_cells g;
     *found = 0;
+    if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     const txm_status status = tmr_cells_make(w, nearby, &g, scratch);
     if (status != TXM_OK) return status;
+    if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     for (size_t i = 0; i < g.count;) {
         size_t end = i + 1;
         while (end < g.count && g.entry[end].key == g.entry[i].key) end++;
+        if (tmr_tick(w, 1)) return TXM_CANCELLED;
         for (size_t x = i; x < end; x++) {
             const int32_t f = (int32_t)g.entry[x].value;
             txm_dvec3 low, high;
@@ -378,7 +381,7 @@ static void tmr_smooth_marked(tmr_work *w, int lines_too) {
 #define TMR_FAIR 0.85 /* ours: quality of triangles that gets no further attention */
 
 /* More rounds of relaxation and flips around the triangles that are still poor. */
-static void tmr_improve_spots(tmr_work *w, int rounds) {
+static txm_status tmr_improve_spots(tmr_work *w, int rounds) {
     tmr_mesh *m = &w->m;
     w->pull = w->step = 1;
     for (int round = 0; round < rounds; round++) {
@@ -399,9 +402,12 @@ static void tmr_improve_spots(tmr_work *w, int rounds) {
         w->mask = w->mask_room;
         for (int k = 0; k < 3; k++) tmr_relax(w);
         w->mask = NULL;
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
         tmr_flip_valences(w, 2, 0.4);
         tmr_flip_delaunay(w, 2);
+        if (tmr_tick(w, m->live)) return TXM_CANCELLED;
     }
+    return TXM_OK;
 }
 
 enum { TMR_SPOT_ROUNDS = 16 };
@@ -427,6 +433,10 @@ static txm_status tmr_mend_spots(tmr_work *w, long *faults) {
                                      &crossings);
         txm_arena_free(&scratch);
         if (status != TXM_OK) break;
+        if (tmr_tick(w, w->m.live)) {
+            status = TXM_CANCELLED;
+            break;
+        }
         const long turned = tmr_count_inverted(w, &doubtful);
         const long score = 1000 * (crossings + turned) + doubtful;
         if (best < 0 || score < best) {

@@ -7,7 +7,11 @@
 
 /* ---- the work ----------------------------------------------------------------------------- */
 
-enum { TMR_CHUNK = 2048 }; /* vertices or triangles per parallel task; does not change results */
+enum {
+    TMR_CHUNK = 2048, /* vertices or triangles per parallel task; does not change results */
+    TMR_TICK = 50000, /* ours: progress is reported after the work of moving so many vertices */
+    TMR_TICK_TRIAL = 20 /* ours: so many are what trying something at one edge takes */
+};
 
 typedef struct tmr_work {
     const tmr_surface *s;
@@ -28,8 +32,18 @@ typedef struct tmr_work {
     uint8_t *mask_room; /* 1 per vertex: memory for mask */
     double pull;       /* of relaxation: how far triangles pull to the wanted size, 0..1        */
     double step;       /* of relaxation: over-relaxation factor                                 */
+    int64_t ticks;     /* work since progress was reported: tmr_tick                            */
     int splinters;     /* of collapsing: also the short sides of much longer triangles          */
 } tmr_work;
+
+/* Report progress if the work of moving TMR_TICK vertices was done since the last time: small meshes need
+   no reports, and of large ones no pass is too long to be cancelled. Non-zero: cancelled, stop. */
+static int tmr_tick(tmr_work *w, int32_t vertices) {
+    w->ticks += vertices;
+    if (w->ticks < TMR_TICK) return 0;
+    w->ticks = 0;
+    return txm_progress(w->env, 0, "relax"); /* the fraction stays at the highest so far */
+}
 
 /* a face of the surface at the vertex */
 static int32_t tmr_face_of(const tmr_work *w, int32_t v) {

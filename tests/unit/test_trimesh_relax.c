@@ -742,6 +742,32 @@ static void test_faults(void **state) {
     }
 }
 
+/* A large mesh reports within passes, and may be cancelled there. */
+static void test_reports(void **state) {
+    long calls[2];
+    (void)state;
+    make_torus(40, 20);
+    for (int k = 0; k < 2; k++) {
+        trimesh_desc d = describe(k ? 8000 : 500, TRIMESH_LATTICE);
+        tk_progress progress = {0};
+        txm_env env = tk_env(NULL, &progress);
+        assert_int_equal(retile_it(&d, &env), TXM_OK);
+        assert_int_equal(progress.errors, 0);
+        calls[k] = progress.calls;
+    }
+    assert_true(calls[1] > calls[0] + 30);
+    for (int k = 1; k < 4; k++) {
+        trimesh_desc d = describe(8000, TRIMESH_LATTICE);
+        tk_progress progress = {0};
+        tk_memory memory = {0};
+        txm_env env = tk_env(&memory, &progress);
+        progress.cancel_at = calls[1] * k / 4;
+        assert_int_equal(retile_it(&d, &env), TXM_CANCELLED);
+        assert_int_equal(progress.late, 0);
+        assert_int_equal(tk_leaks(&memory), 0);
+    }
+}
+
 /* ---- same bytes ------------------------------------------------------------------------------- */
 
 static uint64_t hash_of(const trimesh_desc *d, txm_env *env) {
@@ -834,7 +860,7 @@ int main(void) {
         cmocka_unit_test(test_splinters),
         cmocka_unit_test(test_too_small),   cmocka_unit_test(test_bad_arguments),
         cmocka_unit_test(test_faults),      cmocka_unit_test(test_same_bytes),
-        cmocka_unit_test(test_steps),
+        cmocka_unit_test(test_steps),       cmocka_unit_test(test_reports),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
