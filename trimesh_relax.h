@@ -8084,10 +8084,11 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     for (int round = 0; round < TMR_CLEAN_ROUNDS && status == TXM_OK; round++) {
         tmr_flip_delaunay(w, 4);
         tmr_flip_valences(w, 4, TMR_FAIR_FLIP_CLEAN);
-        for (int k = 0; k < 3; k++) {
+        for (int k = 0; k < 3 && status == TXM_OK; k++) {
             tmr_relax(w);
             if (tmr_tick(w, w->m.live)) status = TXM_CANCELLED;
         }
+        if (status != TXM_OK) break;
         tmr_split_long(w, TMR_LONG, TMR_LONG_ON_LINES);
         tmr_collapse_short(w, TMR_SHORT, TMR_SHORT_ON_LINES, TMR_LONGEST, 1);
     }
