@@ -128,6 +128,20 @@ static void *tpc_reserve(const tpc_planting *p, int done, txm_arena *arena, void
     return larger;
 }
 
+/* Copy what grew in slot i to the place in the forest that its tree has. */
+static void tpc_copy_slot(void *context, int i) {
+    const tpc_planting *p = (const tpc_planting *)context;
+    const tpc_growth *g = &p->slots[i];
+    const treepieces_tree *t = &p->trees[p->first + i];
+    memcpy(p->nodes + t->first_node, g->nodes, t->node_count * sizeof *p->nodes);
+    memcpy(p->bands + t->first_node, g->bands, t->node_count * sizeof *p->bands);
+    for (uint32_t k = 0; k < t->cluster_count; k++) {
+        treepieces_cluster *c = &p->clusters[t->first_cluster + k];
+        *c = g->clusters[k];
+        c->node += t->first_node;
+    }
+}
+
 /* Append the trees that grew in the slots to the forest. */
 static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
     size_t nodes = 0, clusters = 0;
@@ -152,12 +166,6 @@ static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
     for (int i = 0; i < count; i++) {
         const tpc_growth *g = &p->slots[i];
         treepieces_tree *t = &p->trees[p->first + i];
-        memcpy(p->nodes + p->node_count, g->nodes, (size_t)g->node_count * sizeof *p->nodes);
-        memcpy(p->bands + p->node_count, g->bands, (size_t)g->node_count * sizeof *p->bands);
-        for (int k = 0; k < g->cluster_count; k++) {
-            p->clusters[p->cluster_count + (size_t)k] = g->clusters[k];
-            p->clusters[p->cluster_count + (size_t)k].node += (uint32_t)p->node_count;
-        }
         t->first_node = (uint32_t)p->node_count;
         t->node_count = (uint32_t)g->node_count;
         t->first_cluster = (uint32_t)p->cluster_count;
@@ -175,6 +183,7 @@ static txm_status tpc_append_trees(tpc_planting *p, int count, txm_env *env) {
             p->type_counts[k] += g->type_counts[k];
         }
     }
+    txm_parallel_for(env, count, tpc_copy_slot, p);
     return TXM_OK;
 }
 
