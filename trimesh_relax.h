@@ -3685,6 +3685,28 @@ typedef struct tmr_work {
     int splinters;     /* of collapsing: also the short sides of much longer triangles          */
 } tmr_work;
 
+/* A progress callback that passes on to the caller's what never falls, also where something is done twice. */
+typedef struct tmr_rising {
+    int (*progress)(void *user, float fraction, const char *stage); /* the caller's */
+    void *user;
+    float fraction; /* the highest reported */
+} tmr_rising;
+
+static int tmr_rise(void *user, float fraction, const char *stage) {
+    tmr_rising *r = (tmr_rising *)user;
+    if (fraction > r->fraction) r->fraction = fraction;
+    return r->progress(r->user, r->fraction, stage);
+}
+
+/* Let an environment, a copy of the caller's, report by way of r. */
+static void tmr_rise_in(tmr_rising *r, txm_env *env) {
+    if (!env->progress) return;
+    r->progress = env->progress;
+    r->user = env->progress_user;
+    env->progress = tmr_rise;
+    env->progress_user = r;
+}
+
 /* Report progress if the work of moving TMR_TICK vertices was done since the last time: small meshes need
    no reports, and of large ones no pass is too long to be cancelled. Non-zero: cancelled, stop. */
 static int tmr_tick(tmr_work *w, int32_t vertices) {
@@ -7666,9 +7688,11 @@ static txm_status tmr_sample_faces(tmr_sampling *t, txm_arena *scratch) {
             placed++;
             next = step * (placed + txm_rng_double(&rng));
         }
-        for (int32_t k = 0; k < here; k++)
+        for (int32_t k = 0; k < here; k++) {
             tmr_insert(t, f, tmr_sample_place(s, f, k, here, &rng), 0);
-        if (i % 65536 == 65535 && txm_progress(t->w->env, 0.1f, "sample")) return TXM_CANCELLED;
+            if (tmr_tick(t->w, 1)) return TXM_CANCELLED;
+        }
+        if (tmr_tick(t->w, 1)) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
@@ -8027,7 +8051,7 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
     w->pull = effort->pull;
     w->step = effort->step;
     for (int round = 0; round < effort->rounds; round++) {
-        /* the fraction stays at the highest so far: tmr_job_report */
+        /* the fraction stays at the highest so far: tmr_rise */
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
         for (int k = 0; k < effort->relaxations; k++) {
@@ -8244,10 +8268,8 @@ enum tmr_stage {
 
 struct trimesh_job {
     trimesh_desc desc;
-    txm_env env; /* hooks of the current call; progress goes through tmr_job_report      */
-    int (*progress)(void *user, float fraction, const char *stage); /* the caller's             */
-    void *progress_user;
-    float fraction;        /* the highest reported                                              */
+    txm_env env;           /* hooks of the current call; progress goes through rising          */
+    tmr_rising rising;
     trimesh_report report;
     txm_status status;     /* of the first failure                                             */
     int stage;             /* next to be done                                                  */
@@ -8528,7 +8550,7 @@ static const char *tmr_stage_name(int stage) {
 static float tmr_job_fraction(const trimesh_job *job) {
     static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
     const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
-    return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
+    return txm_maxf(job->rising.fraction, from[job->stage] + 0.4f * part);
 }
 
 static txm_status tmr_begin(const trimesh_desc *desc, txm_env *env, int is_trial,
@@ -8659,13 +8681,6 @@ static txm_status tmr_fill_state(trimesh_job *job, trimesh_state *state) {
 
 /* ---- jobs: public --------------------------------------------------------------------------- */
 
-/* Pass progress on, never falling, also where a stage is done twice. */
-static int tmr_job_report(void *user, float fraction, const char *stage) {
-    trimesh_job *job = (trimesh_job *)user;
-    if (fraction > job->fraction) job->fraction = fraction;
-    return job->progress(job->progress_user, job->fraction, stage);
-}
-
 /* Use the hooks of this call, but the allocator of trimesh_begin, which made the blocks. */
 static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
     const txm_env old = job->env;
@@ -8675,11 +8690,7 @@ static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
     job->env.release = old.release;
     job->env.memory_user = old.memory_user;
     job->env.message[0] = 0;
-    if (!job->env.progress) return;
-    job->progress = job->env.progress;
-    job->progress_user = job->env.progress_user;
-    job->env.progress = tmr_job_report;
-    job->env.progress_user = job;
+    tmr_rise_in(&job->rising, &job->env);
 }
 
 /* Hand the message to the caller. */
@@ -8956,6 +8967,8 @@ static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *w
 
 typedef struct tmr_update {
     const trimesh_mesh *old;
+    txm_env env; /* the caller's hooks; progress goes through rising */
+    tmr_rising rising;
     trimesh_desc desc;
     double radius, tolerance; /* in edge lengths */
     tmr_surface s;
@@ -9220,7 +9233,9 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
         run += 6 * u->t.piece[f] / area;
         const int32_t tries = run < 1 ? 0 : run > 1e8 ? 100000000 : (int32_t)run;
         run -= tries;
+        if (tmr_tick(&u->w, 1)) return TXM_CANCELLED;
         for (int32_t k = 0; k < tries && *live < limit; k++) {
+            if (tmr_tick(&u->w, 1)) return TXM_CANCELLED;
             const txm_dvec3 p = tmr_sample_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
             const tmr_place at = tmr_on_face(&u->s, f, p);
             const double length = u->t.length * tmr_scale_at(&u->s, &at);
@@ -9231,7 +9246,6 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
             tmr_grid_add(&u->grid, u->w.m.p[v], v);
             ++*live;
         }
-        if (i % 65536 == 65535 && txm_progress(u->w.env, 0.3f, "sample")) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
@@ -9398,8 +9412,9 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     u->w.length = u->t.length;
     u->w.line_scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double points = fmax(tmr_points_for(u), (double)u->old->vertex_count);
-    if (4 * points > (double)TMR_MOST)
-        return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
+    if (points > (double)TRIMESH_MAX_VERTICES || 4 * points > (double)TMR_MOST)
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "the new surface takes too many vertices at the density of the old mesh; say how many");
     status = tmr_copy_surface(&u->w, tmr_sampling_room(floor(2 * points)), &u->first);
     if (status == TXM_OK) status = tmr_sampling_alloc(&u->t, &u->scratch);
     if (status == TXM_OK) status = tmr_update_alloc(u);
@@ -9512,13 +9527,17 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
     u->desc = desc->desc;
     u->radius = desc->radius > 0 ? desc->radius : 4;
     u->tolerance = desc->tolerance > 0 ? desc->tolerance : 0.2;
-    u->w.env = env;
-    txm_arena_init(&u->input, env);
-    txm_arena_init(&u->first, env);
-    txm_arena_init(&u->scratch, env);
+    if (env) u->env = *env;
+    u->env.message[0] = 0;
+    u->w.env = &u->env;
+    tmr_rise_in(&u->rising, &u->env);
+    txm_arena_init(&u->input, &u->env);
+    txm_arena_init(&u->first, &u->env);
+    txm_arena_init(&u->scratch, &u->env);
     status = tmr_update_run(u, report, mesh);
     if (status == TXM_OUT_OF_MEMORY) txm_fail(env, status, "no memory to update the mesh");
-    if (status == TXM_CANCELLED) txm_fail(env, status, "cancelled while updating the mesh");
+    else if (status == TXM_CANCELLED) txm_fail(env, status, "cancelled while updating the mesh");
+    else if (status != TXM_OK) txm_fail(env, status, u->env.message);
     txm_arena_free(&u->input);
     txm_arena_free(&u->first);
     txm_arena_free(&u->scratch);

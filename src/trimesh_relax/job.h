@@ -25,10 +25,8 @@ enum tmr_stage {
 
 struct trimesh_job {
     trimesh_desc desc;
-    txm_env env; /* hooks of the current call; progress goes through tmr_job_report      */
-    int (*progress)(void *user, float fraction, const char *stage); /* the caller's             */
-    void *progress_user;
-    float fraction;        /* the highest reported                                              */
+    txm_env env;           /* hooks of the current call; progress goes through rising          */
+    tmr_rising rising;
     trimesh_report report;
     txm_status status;     /* of the first failure                                             */
     int stage;             /* next to be done                                                  */
@@ -309,7 +307,7 @@ static const char *tmr_stage_name(int stage) {
 static float tmr_job_fraction(const trimesh_job *job) {
     static const float from[] = {0, 0.05f, 0.15f, 0.3f, 0.05f, 0.5f, 0.7f, 1};
     const float part = job->stage == TMR_STAGE_REPEL ? (float)job->round / (float)job->rounds : 0;
-    return txm_maxf(job->fraction, from[job->stage] + 0.4f * part);
+    return txm_maxf(job->rising.fraction, from[job->stage] + 0.4f * part);
 }
 
 static txm_status tmr_begin(const trimesh_desc *desc, txm_env *env, int is_trial,
@@ -440,13 +438,6 @@ static txm_status tmr_fill_state(trimesh_job *job, trimesh_state *state) {
 
 /* ---- jobs: public --------------------------------------------------------------------------- */
 
-/* Pass progress on, never falling, also where a stage is done twice. */
-static int tmr_job_report(void *user, float fraction, const char *stage) {
-    trimesh_job *job = (trimesh_job *)user;
-    if (fraction > job->fraction) job->fraction = fraction;
-    return job->progress(job->progress_user, job->fraction, stage);
-}
-
 /* Use the hooks of this call, but the allocator of trimesh_begin, which made the blocks. */
 static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
     const txm_env old = job->env;
@@ -456,11 +447,7 @@ static void tmr_job_enter(trimesh_job *job, const txm_env *env) {
     job->env.release = old.release;
     job->env.memory_user = old.memory_user;
     job->env.message[0] = 0;
-    if (!job->env.progress) return;
-    job->progress = job->env.progress;
-    job->progress_user = job->env.progress_user;
-    job->env.progress = tmr_job_report;
-    job->env.progress_user = job;
+    tmr_rise_in(&job->rising, &job->env);
 }
 
 /* Hand the message to the caller. */

@@ -407,9 +407,11 @@ static txm_status tmr_sample_faces(tmr_sampling *t, txm_arena *scratch) {
             placed++;
             next = step * (placed + txm_rng_double(&rng));
         }
-        for (int32_t k = 0; k < here; k++)
+        for (int32_t k = 0; k < here; k++) {
             tmr_insert(t, f, tmr_sample_place(s, f, k, here, &rng), 0);
-        if (i % 65536 == 65535 && txm_progress(t->w->env, 0.1f, "sample")) return TXM_CANCELLED;
+            if (tmr_tick(t->w, 1)) return TXM_CANCELLED;
+        }
+        if (tmr_tick(t->w, 1)) return TXM_CANCELLED;
     }
     return TXM_OK;
 }

@@ -47,7 +47,7 @@ static txm_status tmr_improve(tmr_work *w, const tmr_effort *effort) {
     w->pull = effort->pull;
     w->step = effort->step;
     for (int round = 0; round < effort->rounds; round++) {
-        /* the fraction stays at the highest so far: tmr_job_report */
+        /* the fraction stays at the highest so far: tmr_rise */
         if (txm_progress(w->env, 0, "relax")) return TXM_CANCELLED;
         w->length = tmr_ideal_length(w);
         for (int k = 0; k < effort->relaxations; k++) {

@@ -181,6 +181,8 @@ static int tmr_is_crowded(const tmr_grid *g, const tmr_work *w, const int32_t *w
 
 typedef struct tmr_update {
     const trimesh_mesh *old;
+    txm_env env; /* the caller's hooks; progress goes through rising */
+    tmr_rising rising;
     trimesh_desc desc;
     double radius, tolerance; /* in edge lengths */
     tmr_surface s;
@@ -445,7 +447,9 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
         run += 6 * u->t.piece[f] / area;
         const int32_t tries = run < 1 ? 0 : run > 1e8 ? 100000000 : (int32_t)run;
         run -= tries;
+        if (tmr_tick(&u->w, 1)) return TXM_CANCELLED;
         for (int32_t k = 0; k < tries && *live < limit; k++) {
+            if (tmr_tick(&u->w, 1)) return TXM_CANCELLED;
             const txm_dvec3 p = tmr_sample_place(&u->s, f, k, tries, &rng), n = u->s.normal[f];
             const tmr_place at = tmr_on_face(&u->s, f, p);
             const double length = u->t.length * tmr_scale_at(&u->s, &at);
@@ -456,7 +460,6 @@ static txm_status tmr_update_new(tmr_update *u, const txm_pair *order, double di
             tmr_grid_add(&u->grid, u->w.m.p[v], v);
             ++*live;
         }
-        if (i % 65536 == 65535 && txm_progress(u->w.env, 0.3f, "sample")) return TXM_CANCELLED;
     }
     return TXM_OK;
 }
@@ -623,8 +626,9 @@ static txm_status tmr_update_begin(tmr_update *u, trimesh_report *report) {
     u->w.length = u->t.length;
     u->w.line_scale = u->desc.line_spacing > 0 ? u->desc.line_spacing : 1;
     const double points = fmax(tmr_points_for(u), (double)u->old->vertex_count);
-    if (4 * points > (double)TMR_MOST)
-        return txm_fail(env, TXM_TOO_LARGE, "the new surface takes too many vertices at this density");
+    if (points > (double)TRIMESH_MAX_VERTICES || 4 * points > (double)TMR_MOST)
+        return txm_fail(env, TXM_TOO_LARGE,
+                        "the new surface takes too many vertices at the density of the old mesh; say how many");
     status = tmr_copy_surface(&u->w, tmr_sampling_room(floor(2 * points)), &u->first);
     if (status == TXM_OK) status = tmr_sampling_alloc(&u->t, &u->scratch);
     if (status == TXM_OK) status = tmr_update_alloc(u);
@@ -737,13 +741,17 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
     u->desc = desc->desc;
     u->radius = desc->radius > 0 ? desc->radius : 4;
     u->tolerance = desc->tolerance > 0 ? desc->tolerance : 0.2;
-    u->w.env = env;
-    txm_arena_init(&u->input, env);
-    txm_arena_init(&u->first, env);
-    txm_arena_init(&u->scratch, env);
+    if (env) u->env = *env;
+    u->env.message[0] = 0;
+    u->w.env = &u->env;
+    tmr_rise_in(&u->rising, &u->env);
+    txm_arena_init(&u->input, &u->env);
+    txm_arena_init(&u->first, &u->env);
+    txm_arena_init(&u->scratch, &u->env);
     status = tmr_update_run(u, report, mesh);
     if (status == TXM_OUT_OF_MEMORY) txm_fail(env, status, "no memory to update the mesh");
-    if (status == TXM_CANCELLED) txm_fail(env, status, "cancelled while updating the mesh");
+    else if (status == TXM_CANCELLED) txm_fail(env, status, "cancelled while updating the mesh");
+    else if (status != TXM_OK) txm_fail(env, status, u->env.message);
     txm_arena_free(&u->input);
     txm_arena_free(&u->first);
     txm_arena_free(&u->scratch);

@@ -36,6 +36,28 @@ typedef struct tmr_work {
     int splinters;     /* of collapsing: also the short sides of much longer triangles          */
 } tmr_work;
 
+/* A progress callback that passes on to the caller's what never falls, also where something is done twice. */
+typedef struct tmr_rising {
+    int (*progress)(void *user, float fraction, const char *stage); /* the caller's */
+    void *user;
+    float fraction; /* the highest reported */
+} tmr_rising;
+
+static int tmr_rise(void *user, float fraction, const char *stage) {
+    tmr_rising *r = (tmr_rising *)user;
+    if (fraction > r->fraction) r->fraction = fraction;
+    return r->progress(r->user, r->fraction, stage);
+}
+
+/* Let an environment, a copy of the caller's, report by way of r. */
+static void tmr_rise_in(tmr_rising *r, txm_env *env) {
+    if (!env->progress) return;
+    r->progress = env->progress;
+    r->user = env->progress_user;
+    env->progress = tmr_rise;
+    env->progress_user = r;
+}
+
 /* Report progress if the work of moving TMR_TICK vertices was done since the last time: small meshes need
    no reports, and of large ones no pass is too long to be cancelled. Non-zero: cancelled, stop. */
 static int tmr_tick(tmr_work *w, int32_t vertices) {

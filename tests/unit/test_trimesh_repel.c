@@ -560,6 +560,33 @@ static void test_update_same(void **state) {
     }
 }
 
+/* A surface that takes hundreds of thousands of vertices at the density of the old mesh can be left while
+   they are strewn; one that takes too many is refused at once. */
+static void test_update_large(void **state) {
+    (void)state;
+    clear(&one);
+    add_ball(&one, 12, 0, 0, 0);
+    trimesh_mesh *old = retile(&one, 100), *m = NULL;
+    const float sizes[2] = {60, 1e4f};
+    for (int k = 0; k < 2; k++) {
+        clear(&two);
+        add_ball(&two, 12, 0, 0, 0);
+        for (uint32_t i = 0; i < 3 * two.nv; i++) two.p[i] *= sizes[k];
+        trimesh_update_desc u;
+        tk_progress progress;
+        memset(&u, 0, sizeof u);
+        memset(&progress, 0, sizeof progress);
+        progress.cancel_at = k ? 0 : 30;
+        txm_env env = tk_env(NULL, &progress);
+        u.desc = describe(&two, 0);
+        assert_int_equal(trimesh_update(old, &u, &env, &m), k ? TXM_TOO_LARGE : TXM_CANCELLED);
+        assert_null(m);
+        assert_true(progress.errors == 0 && progress.late == 0);
+        if (k) assert_non_null(strstr(env.message, "say how many"));
+    }
+    trimesh_mesh_free(old);
+}
+
 static void test_update_cut(void **state) {
     (void)state;
     const double h = 0.3;
@@ -714,6 +741,7 @@ int main(void) {
         cmocka_unit_test(test_thin),          cmocka_unit_test(test_scale),
         cmocka_unit_test(test_steps),         cmocka_unit_test(test_convergence),
         cmocka_unit_test(test_same_bytes),    cmocka_unit_test(test_update_same),
+        cmocka_unit_test(test_update_large),
         cmocka_unit_test(test_update_cut),    cmocka_unit_test(test_arguments),
         cmocka_unit_test(test_faults),
     };

@@ -139,6 +139,21 @@ static trimesh_mesh *step_by_step(const trimesh_desc *d, trouble *t, txm_env *en
     return mesh;
 }
 
+/* the diagonal of the box about all corners of faces */
+static double spread_of(const soup *m) {
+    double square = 0;
+    for (size_t k = 0; k < 3; k++) {
+        double low = 1e300, high = -1e300;
+        for (size_t i = 0; i < 3 * m->faces; i++) {
+            const double x = m->positions[3 * (size_t)m->indices[i] + k];
+            low = x < low ? x : low;
+            high = x > high ? x : high;
+        }
+        square += high > low ? (high - low) * (high - low) : 0;
+    }
+    return sqrt(square);
+}
+
 static void update(pool *p, source *s, soup *m, const trimesh_mesh *old) {
     trimesh_report report;
     trimesh_update_desc u;
@@ -149,7 +164,8 @@ static void update(pool *p, source *s, soup *m, const trimesh_mesh *old) {
     if (pick(s, 12) == 0) make_soup(m, s);
     for (int k = 0; k < changes; k++) spoil(m, s);
     u.desc = make_desc(p, s, m, &report);
-    if (pick(s, 3)) u.desc.vertices = 0;
+    /* at the density of the old mesh, but not by the million where a spoilt corner is far away */
+    if (pick(s, 3) && spread_of(m) < 300 * (double)old->edge_length) u.desc.vertices = 0;
     if (pick(s, 3) == 0) u.radius = any_number(s, 1, 20);
     if (pick(s, 3) == 0) u.tolerance = any_number(s, 0, 0.5f);
     txm_env env = troubled(&t, s);
