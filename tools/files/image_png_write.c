@@ -131,9 +131,13 @@ static void deflate_band(const writing *w, band *b, unsigned char *raw) {
         z.avail_in = (uInt)b->raw;
         z.next_out = b->bytes;
         z.avail_out = (uInt)room;
-        deflate(&z, b->is_last ? Z_FINISH : Z_SYNC_FLUSH);
+        const int want = b->is_last ? Z_STREAM_END : Z_OK, got = deflate(&z, b->is_last ? Z_FINISH : Z_SYNC_FLUSH);
         b->size = room - z.avail_out;
         b->sum = adler32(adler32(0, NULL, 0), raw, (uInt)b->raw);
+        if (got != want || z.avail_in || !z.avail_out) { /* cannot be: the room would not do */
+            free(b->bytes);
+            b->bytes = NULL;
+        }
     }
     deflateEnd(&z);
 }
