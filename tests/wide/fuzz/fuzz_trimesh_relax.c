@@ -139,13 +139,14 @@ static trimesh_mesh *step_by_step(const trimesh_desc *d, trouble *t, txm_env *en
     return mesh;
 }
 
-/* the diagonal of the box about all corners of faces */
+/* the diagonal of the box about the corners of all faces */
 static double spread_of(const soup *m) {
     double square = 0;
     for (size_t k = 0; k < 3; k++) {
         double low = 1e300, high = -1e300;
         for (size_t i = 0; i < 3 * m->faces; i++) {
-            const double x = m->positions[3 * (size_t)m->indices[i] + k];
+            if (m->indices[i] >= m->vertices) continue; /* spoilt, too */
+            const double x = (double)m->positions[3 * (size_t)m->indices[i] + k];
             low = x < low ? x : low;
             high = x > high ? x : high;
         }
