@@ -849,7 +849,7 @@ int main(void) {
     glBindVertexArray(array);
     make_target(64, 64); /* without a frame buffer nothing is drawn or recorded */
     test_rims();
-    test_cracks(NULL, 150, 2, 2.5f);
+    test_cracks(NULL, 150, 0.5f, 3);
     test_cracks(any_piece, 100, 1, 1.5f);
     test_impostors();
     /* outlines of leaves differ, as only OpenGL filters them, and behind them is a leaf far away */
