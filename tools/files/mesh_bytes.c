@@ -140,8 +140,10 @@ void sink_move(sink *s, sink *from) {
 /* Are floats in memory as they are in files? */
 static int floats_are_little_endian(void) {
     const float one = 1;
-    const unsigned char raw[4] = {0, 0, 0x80, 0x3f};
-    return !memcmp(&one, raw, sizeof raw);
+    const unsigned char in_file[4] = {0, 0, 0x80, 0x3f};
+    unsigned char raw[4];
+    memcpy(raw, &one, sizeof raw);
+    return !memcmp(raw, in_file, sizeof raw);
 }
 
 void sink_lend_floats(sink *s, const float *v, size_t n) {
