@@ -3,7 +3,8 @@
 
 LIBRARY is tests/kit/starve.c, compiled. The run succeeds if no allocation fails. If one does, it must end
 with status 1, one line on stderr and no output; or succeed with the same output as before, where it can
-do without. At most TRIES allocations are tried: the first half of them, and others in larger and larger steps.
+do without. At most TRIES allocations are tried: half of these are the first ones, the others are spread evenly
+over the rest, to the last.
 Outputs are what is new in the current folder."""
 import os
 import shutil
@@ -42,16 +43,17 @@ if status or not want:
     sys.exit("status %d, %d files: %s" % (status, len(want), errors))
 with open("../count") as file:
     count = int(file.read())
-at, tried, wrong = 1, 0, 0
-while at <= count:
+first = min(count, tries // 2)
+others = min(count - first, tries - first)
+chosen = list(range(1, first + 1)) + [first + (count - first) * (k + 1) // others for k in range(others)]
+wrong = 0
+for at in chosen:
     status, errors = run(at)
     made = take_outputs()
     refused = status == 1 and not made and errors.startswith("texkit") and errors.count("\n") == 1
     if not refused and not (status == 0 and made == want):
         print("allocation", at, "of", count, "fails: status", status, "files", sorted(made), errors)
         wrong += 1
-    tried += 1
-    at += 1 if 2 * tried < tries else max(1, 2 * (count - at) // (tries + 2 - tried))
-print(tried, "of", count, "allocations")
-if wrong or tried < min(count, 10):
+print(len(chosen), "of", count, "allocations")
+if wrong or len(chosen) < min(count, 10):
     sys.exit(1)

@@ -2,18 +2,18 @@
 # Every command when memory runs out at one allocation after the other: status 1, one line, no output.
 # tests/tool/check_starved.py runs the tool as released with tests/kit/starve.c, which needs glibc.
 . tests/kit/tap.sh
+. tests/kit/texkit.sh
 
 root=$(pwd)
 released=$root/build/texkit checker=$root/tests/tool/check_starved.py draw=$root/build/draw
 tries=$([ "$FULL" = 1 ] && echo 400 || echo 24)
-export OMP_WAIT_POLICY=passive GOMP_SPINCOUNT=20000 # or the tool starts itself again
 if ! getconf GNU_LIBC_VERSION >/dev/null 2>&1; then
     echo "ok - starved # SKIP the C library is another"
     exit
 fi
 # shellcheck disable=SC2086 # flags are words
 check "the library builds" $CC -std=gnu99 -O2 -fPIC -shared tests/kit/starve.c -o "$tmp/starve.so" || exit 1
-# two materials with their labels, a mesh with a texture and a mask of it, an UV cube, a hole
+# two materials with their labels, a mesh with a texture and a mask of it, a sphere, a hole
 /usr/bin/python3 tests/tool/check_patch.py draw "$tmp"
 mkdir "$tmp/run"
 cd "$tmp/run" || exit 1

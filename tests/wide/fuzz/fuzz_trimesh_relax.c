@@ -65,17 +65,28 @@ static void look_at_edges(const trimesh_mesh *mesh) {
     free(sorted);
 }
 
-static void look_at_mesh(const trimesh_mesh *mesh, const txm_mesh *surface) {
-    float low[3] = {3e38f, 3e38f, 3e38f}, high[3] = {-3e38f, -3e38f, -3e38f};
-    uint8_t *used = (uint8_t *)calloc(mesh->vertex_count, 1);
-    if (!used) exit(1);
-    for (size_t i = 0; i < 3 * surface->face_count; i++)
-        for (size_t k = 0; k < 3; k++) {
+/* The box about the corners of all faces, but for spoilt indices. Returns its diagonal. */
+static double box_of(const txm_mesh *surface, float low[3], float high[3]) {
+    double square = 0;
+    for (size_t k = 0; k < 3; k++) {
+        low[k] = 3e38f;
+        high[k] = -3e38f;
+        for (size_t i = 0; i < 3 * surface->face_count; i++) {
+            if (surface->indices[i] >= surface->vertex_count) continue;
             const float x = surface->positions[3 * (size_t)surface->indices[i] + k];
             low[k] = txm_minf(low[k], x);
             high[k] = txm_maxf(high[k], x);
         }
-    const double size = hypot(hypot((double)high[0] - low[0], (double)high[1] - low[1]), (double)high[2] - low[2]);
+        square += ((double)high[k] - low[k]) * ((double)high[k] - low[k]);
+    }
+    return sqrt(square);
+}
+
+static void look_at_mesh(const trimesh_mesh *mesh, const txm_mesh *surface) {
+    float low[3], high[3];
+    const double size = box_of(surface, low, high);
+    uint8_t *used = (uint8_t *)calloc(mesh->vertex_count, 1);
+    if (!used) exit(1);
     must(mesh->vertex_count >= 3 && mesh->triangle_count >= 1 && mesh->edge_length > 0);
     for (size_t v = 0; v < mesh->vertex_count; v++) {
         const txm_mesh_place at = mesh->sources[v];
@@ -139,22 +150,6 @@ static trimesh_mesh *step_by_step(const trimesh_desc *d, trouble *t, txm_env *en
     return mesh;
 }
 
-/* the diagonal of the box about the corners of all faces */
-static double spread_of(const soup *m) {
-    double square = 0;
-    for (size_t k = 0; k < 3; k++) {
-        double low = 1e300, high = -1e300;
-        for (size_t i = 0; i < 3 * m->faces; i++) {
-            if (m->indices[i] >= m->vertices) continue; /* spoilt, too */
-            const double x = (double)m->positions[3 * (size_t)m->indices[i] + k];
-            low = x < low ? x : low;
-            high = x > high ? x : high;
-        }
-        square += high > low ? (high - low) * (high - low) : 0;
-    }
-    return sqrt(square);
-}
-
 static void update(pool *p, source *s, soup *m, const trimesh_mesh *old) {
     trimesh_report report;
     trimesh_update_desc u;
@@ -166,7 +161,8 @@ static void update(pool *p, source *s, soup *m, const trimesh_mesh *old) {
     for (int k = 0; k < changes; k++) spoil(m, s);
     u.desc = make_desc(p, s, m, &report);
     /* at the density of the old mesh, but not by the million where a spoilt corner is far away */
-    if (pick(s, 3) && spread_of(m) < 300 * (double)old->edge_length) u.desc.vertices = 0;
+    float low[3], high[3];
+    if (pick(s, 3) && box_of(&u.desc.surface, low, high) < 300 * (double)old->edge_length) u.desc.vertices = 0;
     if (pick(s, 3) == 0) u.radius = any_number(s, 1, 20);
     if (pick(s, 3) == 0) u.tolerance = any_number(s, 0, 0.5f);
     txm_env env = troubled(&t, s);
