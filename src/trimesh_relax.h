@@ -337,6 +337,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/ridges.h"
 #include "trimesh_relax/relax.h"
 #include "trimesh_relax/collapse.h"
+#include "trimesh_relax/renumber.h"
 #include "trimesh_relax/fields.h"
 #include "trimesh_relax/count.h"
 #include "trimesh_relax/trial.h"

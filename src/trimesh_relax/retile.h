@@ -2,6 +2,7 @@
 #define TRIMESH_RELAX_RETILE_H
 
 #include "fields.h"
+#include "renumber.h"
 #include "count.h"
 #include "defects.h"
 #include "slivers.h"
@@ -93,6 +94,7 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
     txm_arena arena;
     int32_t missing = 0;
     txm_status status = tmr_resample(w);
+    if (status == TXM_OK) status = tmr_renumber(w);
     if (status != TXM_OK) return status;
     txm_arena_init(&arena, w->env);
     status = tmr_thin_lines(w, &arena);
@@ -100,6 +102,7 @@ static txm_status tmr_make_lattice(tmr_work *w, int32_t target, uint64_t seed) {
         tmr_even_lines(w);
         status = tmr_set_spacing(w, target);
         if (status == TXM_OK) status = tmr_solve_lattice(w, seed, &arena);
+        if (status == TXM_OK) status = tmr_renumber(w);
     }
     for (int round = 0; round < TMR_CLEAN_ROUNDS && status == TXM_OK; round++) {
         tmr_flip_delaunay(w, 4);
