@@ -2952,8 +2952,21 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     }
 }
 
+/* Shorten the wanted edge lengths until they grow by no more than d / 3 over a distance d. */
+static void tmr_grade_scale(const tmr_surface *s, double spacing, float *scale) {
+    for (int sweep = 0; sweep < TMR_GRADE_SWEEPS; sweep++) {
+        for (int32_t i = 0; i < 3 * s->face_count; i++) {
+            const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
+            const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
+            const double d = txm_d3_dist(s->point[a], s->point[b]) / spacing / 3;
+            scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
+            scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
+        }
+    }
+}
+
 /* Shorten the wanted edge lengths where the surface bends, fully or in part (adapt), so that an
-   edge turns by no more than TMR_TURN_PER_EDGE. Over a distance d they grow by no more than d / 3. */
+   edge turns by no more than TMR_TURN_PER_EDGE. */
 static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
                                   txm_arena *scratch) {
     const size_t n = (size_t)s->vertex_count;
@@ -2966,15 +2979,7 @@ static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, 
         const double limited = wanted < TMR_LEAST_SIZE ? TMR_LEAST_SIZE : wanted > 1 ? 1 : wanted;
         scale[v] = txm_float((s->scale ? s->scale[v] : 1) * (1 - adapt + adapt * limited));
     }
-    for (int sweep = 0; sweep < TMR_GRADE_SWEEPS; sweep++) {
-        for (int32_t i = 0; i < 3 * s->face_count; i++) {
-            const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
-            const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
-            const double d = txm_d3_dist(s->point[a], s->point[b]) / spacing / 3;
-            scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
-            scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
-        }
-    }
+    tmr_grade_scale(s, spacing, scale);
     s->scale = scale;
     return TXM_OK;
 }
@@ -3714,6 +3719,11 @@ static int tmr_tick(tmr_work *w, int32_t vertices) {
     if (w->ticks < TMR_TICK) return 0;
     w->ticks = 0;
     return txm_progress(w->env, 0, "relax"); /* the fraction stays at the highest so far */
+}
+
+/* Does the caller want edges of different lengths? Others are a means: tmr_halve_at_spots. */
+static int tmr_wants_sizes(const tmr_work *w) {
+    return w->desc->scale != NULL || w->desc->adapt > 0;
 }
 
 /* a face of the surface at the vertex */
@@ -6125,7 +6135,7 @@ static double tmr_strain(const tmr_work *w, int32_t face) {
         return TMR_STRAIN_OF_FOLD;
     const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
     const double x = area2 / (0.86602540378443865 * size * size);
-    return 1 / q - 1 + (w->s->scale ? TMR_STRAIN_OF_WANTED : TMR_STRAIN_OF_SIZE) * (x + 1 / x - 2);
+    return 1 / q - 1 + (tmr_wants_sizes(w) ? TMR_STRAIN_OF_WANTED : TMR_STRAIN_OF_SIZE) * (x + 1 / x - 2);
 }
 
 /* The part of the mesh around an edge, as it was before a trial: the ends of the edge and the two
@@ -8352,6 +8362,45 @@ TRIMESH_API void trimesh_mesh_free(trimesh_mesh *mesh) {
     txm_arena_free(&arena);
 }
 
+/* ---- shorter edges where triangles cross ---------------------------------------------------- */
+
+/* Where two sheets lie closer to each other than triangles stand off a bent surface, these cross. Another
+   attempt wants shorter edges there, and only there: a chord of half the length stands off a quarter as
+   far. */
+enum { TMR_FINER_REACH = 2 }; /* ours: so many rings around the spots */
+
+/* Mark the vertices of triangles that cross or are inverted, and their surroundings, in w->bad. */
+static txm_status tmr_mark_spots(tmr_work *w) {
+    long crossings, doubtful;
+    txm_arena scratch;
+    memset(w->bad, 0, (size_t)w->m.vertex_count);
+    txm_arena_init(&scratch, w->env);
+    const txm_status status = tmr_count_crossings(w, NULL, TMR_COUNT_CROSSING, &scratch, &crossings);
+    txm_arena_free(&scratch);
+    if (status != TXM_OK) return status;
+    tmr_count_inverted(w, &doubtful);
+    for (int ring = 0; ring < TMR_FINER_REACH; ring++) tmr_grow_marks(w);
+    return TXM_OK;
+}
+
+/* Halve the wanted edge lengths where the mesh is not sound. */
+static txm_status tmr_halve_at_spots(tmr_work *w, tmr_surface *s, txm_arena *arena) {
+    const size_t n = (size_t)s->vertex_count;
+    float *scale = (float *)txm_arena_alloc(arena, n, sizeof(float));
+    if (!scale) return TXM_OUT_OF_MEMORY;
+    const txm_status status = tmr_mark_spots(w);
+    if (status != TXM_OK) return status;
+    for (size_t v = 0; v < n; v++) scale[v] = s->scale ? s->scale[v] : 1;
+    for (int32_t v = 0; v < w->m.vertex_count; v++) {
+        if (!w->bad[v] || w->m.corner[v] < 0 || tmr_is_ghost(&w->m, v)) continue;
+        const int32_t *k = s->vertex + 3 * tmr_face_of(w, v);
+        for (int i = 0; i < 3; i++) scale[k[i]] = txm_float(0.5 * (s->scale ? s->scale[k[i]] : 1));
+    }
+    tmr_grade_scale(s, w->length, scale);
+    s->scale = scale;
+    return TXM_OK;
+}
+
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
 #define TMR_FLAT_VOLUME 1e-6 /* ours: thickness of what has no inside, in diagonals               */
@@ -8378,8 +8427,7 @@ struct trimesh_job {
     int round, rounds;     /* of repulsion: done; at most                                      */
     double mean, largest;  /* movement in the last one                                         */
     int plain;             /* strips are left as they are: ridges.h                              */
-    int retries;           /* with adapted density so far                                       */
-    float *plain_scale;    /* scale before the retries                                          */
+    int retries;           /* with shorter edges so far                                         */
     uint64_t wanted;       /* after TXM_TOO_SMALL: how many vertices may do                     */
     uint8_t crosses[2];    /* the surface crosses, or touches itself: 0 = not known, 1 = no, 2 = yes */
     int is_trial;          /* to find out whether so many vertices do: one attempt, no hint      */
@@ -8568,30 +8616,32 @@ static int tmr_is_flat(const tmr_surface *s) {
     return s->loop_count == 0 && fabs(s->volume) <= TMR_FLAT_VOLUME * s->area;
 }
 
+/* Want shorter edges: first where the mesh, which has the number of vertices if it is exact, is not sound;
+   then wherever the surface bends, too. */
+static txm_status tmr_job_shorten(trimesh_job *job, int exact) {
+    txm_status status = TXM_OK;
+    if (exact) status = tmr_halve_at_spots(&job->w, &job->s, &job->input);
+    if (status == TXM_OK && (job->retries || !exact))
+        status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), 1, &job->input, &job->scratch);
+    job->retries++;
+    return status;
+}
+
 /* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
-   with shorter edges where the surface bends. *retries receives 0 if nothing is left to try. */
-static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
-    const int coarse = job->w.line_scale > 1;
+   with shorter edges. *again receives 0 if nothing is left to try. */
+static txm_status tmr_job_retry(trimesh_job *job, int exact, int *again) {
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
-    *retries = !job->is_trial && (coarse || quartered || job->retries < 2);
-    if (!*retries) return TXM_OK;
+    txm_status status = TXM_OK;
+    *again = !job->is_trial && (job->w.line_scale > 1 || quartered || job->retries < 2);
+    if (!*again) return TXM_OK;
+    if (job->w.line_scale > 1) job->w.line_scale = 1; /* lines were too coarse for the inside */
+    else if (quartered) job->cut--;
+    else status = tmr_job_shorten(job, exact);
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
-    if (coarse) {
-        job->w.line_scale = 1; /* lines were too coarse for the inside        */
-    } else if (quartered) {
-        job->cut--;
-    } else {
-        job->s.scale = job->retries ? job->plain_scale : job->s.scale;
-        job->plain_scale = job->s.scale;
-        const txm_status status = tmr_adapt_scale(
-            &job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input, &job->scratch);
-        if (status != TXM_OK) return status;
-        job->retries++;
-    }
     job->stage = TMR_STAGE_LATTICE;
-    return TXM_OK;
+    return status;
 }
 
 /* Prepare another attempt from the beginning, without lines instead of strips. */
@@ -8628,7 +8678,7 @@ static txm_status tmr_job_finish(trimesh_job *job) {
             if (status != TXM_OK || crosses) return status;
         }
     }
-    status = tmr_job_retry(job, &again);
+    status = tmr_job_retry(job, exact, &again);
     if (status != TXM_OK || again) return status;
     if (exact) { /* as the last resort: sheets that touch may be meant to cross */
         status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);

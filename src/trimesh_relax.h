@@ -348,6 +348,7 @@ TRIMESH_API txm_status trimesh_update(const trimesh_mesh *old, const trimesh_upd
 #include "trimesh_relax/join.h"
 #include "trimesh_relax/repel.h"
 #include "trimesh_relax/retile.h"
+#include "trimesh_relax/finer.h"
 #include "trimesh_relax/job.h"
 #include "trimesh_relax/update.h"
 #endif /* TRIMESH_RELAX_IMPLEMENTATION */

@@ -43,8 +43,21 @@ static void tmr_curvature(const tmr_surface *s, float *curvature) {
     }
 }
 
+/* Shorten the wanted edge lengths until they grow by no more than d / 3 over a distance d. */
+static void tmr_grade_scale(const tmr_surface *s, double spacing, float *scale) {
+    for (int sweep = 0; sweep < TMR_GRADE_SWEEPS; sweep++) {
+        for (int32_t i = 0; i < 3 * s->face_count; i++) {
+            const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
+            const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
+            const double d = txm_d3_dist(s->point[a], s->point[b]) / spacing / 3;
+            scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
+            scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
+        }
+    }
+}
+
 /* Shorten the wanted edge lengths where the surface bends, fully or in part (adapt), so that an
-   edge turns by no more than TMR_TURN_PER_EDGE. Over a distance d they grow by no more than d / 3. */
+   edge turns by no more than TMR_TURN_PER_EDGE. */
 static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, txm_arena *arena,
                                   txm_arena *scratch) {
     const size_t n = (size_t)s->vertex_count;
@@ -57,15 +70,7 @@ static txm_status tmr_adapt_scale(tmr_surface *s, double spacing, double adapt, 
         const double limited = wanted < TMR_LEAST_SIZE ? TMR_LEAST_SIZE : wanted > 1 ? 1 : wanted;
         scale[v] = txm_float((s->scale ? s->scale[v] : 1) * (1 - adapt + adapt * limited));
     }
-    for (int sweep = 0; sweep < TMR_GRADE_SWEEPS; sweep++) {
-        for (int32_t i = 0; i < 3 * s->face_count; i++) {
-            const int32_t c = sweep % 2 ? 3 * s->face_count - 1 - i : i;
-            const int32_t a = s->vertex[tmr_next(c)], b = s->vertex[tmr_prev(c)];
-            const double d = txm_d3_dist(s->point[a], s->point[b]) / spacing / 3;
-            scale[a] = txm_minf(scale[a], txm_float(scale[b] + d));
-            scale[b] = txm_minf(scale[b], txm_float(scale[a] + d));
-        }
-    }
+    tmr_grade_scale(s, spacing, scale);
     s->scale = scale;
     return TXM_OK;
 }

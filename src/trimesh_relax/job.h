@@ -7,6 +7,7 @@
 #include "pieces.h"
 #include "repel.h"
 #include "retile.h"
+#include "finer.h"
 
 /* ---- retiling step by step ----------------------------------------------------------------- */
 
@@ -34,8 +35,7 @@ struct trimesh_job {
     int round, rounds;     /* of repulsion: done; at most                                      */
     double mean, largest;  /* movement in the last one                                         */
     int plain;             /* strips are left as they are: ridges.h                              */
-    int retries;           /* with adapted density so far                                       */
-    float *plain_scale;    /* scale before the retries                                          */
+    int retries;           /* with shorter edges so far                                         */
     uint64_t wanted;       /* after TXM_TOO_SMALL: how many vertices may do                     */
     uint8_t crosses[2];    /* the surface crosses, or touches itself: 0 = not known, 1 = no, 2 = yes */
     int is_trial;          /* to find out whether so many vertices do: one attempt, no hint      */
@@ -224,30 +224,32 @@ static int tmr_is_flat(const tmr_surface *s) {
     return s->loop_count == 0 && fabs(s->volume) <= TMR_FLAT_VOLUME * s->area;
 }
 
+/* Want shorter edges: first where the mesh, which has the number of vertices if it is exact, is not sound;
+   then wherever the surface bends, too. */
+static txm_status tmr_job_shorten(trimesh_job *job, int exact) {
+    txm_status status = TXM_OK;
+    if (exact) status = tmr_halve_at_spots(&job->w, &job->s, &job->input);
+    if (status == TXM_OK && (job->retries || !exact))
+        status = tmr_adapt_scale(&job->s, tmr_job_spacing(job), 1, &job->input, &job->scratch);
+    job->retries++;
+    return status;
+}
+
 /* Prepare another attempt: with denser lines, then with the full number if it was a quarter, then
-   with shorter edges where the surface bends. *retries receives 0 if nothing is left to try. */
-static txm_status tmr_job_retry(trimesh_job *job, int *retries) {
-    const int coarse = job->w.line_scale > 1;
+   with shorter edges. *again receives 0 if nothing is left to try. */
+static txm_status tmr_job_retry(trimesh_job *job, int exact, int *again) {
     const int quartered = job->desc.method == TRIMESH_LATTICE && job->cut;
-    *retries = !job->is_trial && (coarse || quartered || job->retries < 2);
-    if (!*retries) return TXM_OK;
+    txm_status status = TXM_OK;
+    *again = !job->is_trial && (job->w.line_scale > 1 || quartered || job->retries < 2);
+    if (!*again) return TXM_OK;
+    if (job->w.line_scale > 1) job->w.line_scale = 1; /* lines were too coarse for the inside */
+    else if (quartered) job->cut--;
+    else status = tmr_job_shorten(job, exact);
     txm_arena_free(&job->first);
     txm_arena_free(&job->second);
     memset(&job->w.m, 0, sizeof job->w.m);
-    if (coarse) {
-        job->w.line_scale = 1; /* lines were too coarse for the inside        */
-    } else if (quartered) {
-        job->cut--;
-    } else {
-        job->s.scale = job->retries ? job->plain_scale : job->s.scale;
-        job->plain_scale = job->s.scale;
-        const txm_status status = tmr_adapt_scale(
-            &job->s, tmr_job_spacing(job), job->retries ? 1 : 0.6, &job->input, &job->scratch);
-        if (status != TXM_OK) return status;
-        job->retries++;
-    }
     job->stage = TMR_STAGE_LATTICE;
-    return TXM_OK;
+    return status;
 }
 
 /* Prepare another attempt from the beginning, without lines instead of strips. */
@@ -284,7 +286,7 @@ static txm_status tmr_job_finish(trimesh_job *job) {
             if (status != TXM_OK || crosses) return status;
         }
     }
-    status = tmr_job_retry(job, &again);
+    status = tmr_job_retry(job, exact, &again);
     if (status != TXM_OK || again) return status;
     if (exact) { /* as the last resort: sheets that touch may be meant to cross */
         status = tmr_surface_crosses(job, TMR_ANY_TOUCHING, &crosses);

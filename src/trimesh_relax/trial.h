@@ -29,7 +29,7 @@ static double tmr_strain(const tmr_work *w, int32_t face) {
         return TMR_STRAIN_OF_FOLD;
     const double size = w->length * (w->size[v[0]] + (double)w->size[v[1]] + w->size[v[2]]) / 3;
     const double x = area2 / (0.86602540378443865 * size * size);
-    return 1 / q - 1 + (w->s->scale ? TMR_STRAIN_OF_WANTED : TMR_STRAIN_OF_SIZE) * (x + 1 / x - 2);
+    return 1 / q - 1 + (tmr_wants_sizes(w) ? TMR_STRAIN_OF_WANTED : TMR_STRAIN_OF_SIZE) * (x + 1 / x - 2);
 }
 
 /* The part of the mesh around an edge, as it was before a trial: the ends of the edge and the two

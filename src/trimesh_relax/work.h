@@ -67,6 +67,11 @@ static int tmr_tick(tmr_work *w, int32_t vertices) {
     return txm_progress(w->env, 0, "relax"); /* the fraction stays at the highest so far */
 }
 
+/* Does the caller want edges of different lengths? Others are a means: tmr_halve_at_spots. */
+static int tmr_wants_sizes(const tmr_work *w) {
+    return w->desc->scale != NULL || w->desc->adapt > 0;
+}
+
 /* a face of the surface at the vertex */
 static int32_t tmr_face_of(const tmr_work *w, int32_t v) {
     const int kind = tmr_kind_of(&w->m, v);
