@@ -85,7 +85,7 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 30 bytes for each pixel of the output while it is made, and 40 for each pixel of at
+     RGB: some 24 bytes for each pixel of the output while it is made, and 40 for each pixel of at
      most 320 rows of it; a copy of each map that has transparent pixels; some 6 for each pixel of the
      exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 20
      bytes for each pixel along the upper and lower sides of a row of cells.
@@ -439,7 +439,7 @@ typedef struct txp_courses {
 
 /* What all jobs on the same exemplars share. */
 typedef struct txp_source {
-    int sheets, levels, bytes, guide_at, guide_bytes;
+    int sheets, levels, bytes, tones, guide_at, guide_bytes; /* tones: bytes of the maps          */
     int has_lattice, is_random; /* is_random: no long-range order at all                        */
     txp_courses courses;        /* where the lattice holds for each course alone                */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
@@ -451,13 +451,6 @@ typedef struct txp_source {
     txp_stack stack[TXP_MAX_LEVELS];
 } txp_source;
 
-/* Room for a band of rows, per pixel. */
-typedef struct txp_band {
-    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
-    int32_t *nearest;      /* squared distance of the best candidate from the mean             */
-    uint8_t *mean;
-} txp_band;
-
 /* The picture at one resolution. Beyond the end of an axis that wraps, pixels repeats the first
    columns and rows. */
 typedef struct txp_canvas {
@@ -466,7 +459,6 @@ typedef struct txp_canvas {
     uint8_t *pixels;
     txp_place *at;
     txp_place *next; /* where a pass puts what it chooses; only during one                      */
-    txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
     uint8_t *free_guide; /* 1 = the guide does not count here; NULL: it does, or there is none  */
 } txp_canvas;
@@ -2285,6 +2277,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     u->most_weight = s->guide_bytes ? u->guide_weight : 0;
     for (int m = 0; m < u->map_count; m++)
         u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
+    s->tones = bytes;
     s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
     s->guide_at = s->guide_bytes ? bytes : s->bytes;
     txp_find_alphas(u, s);
@@ -2604,6 +2597,13 @@ static void txp_quilt_run(txp_quilt *q) {
 
 /* ---- second pass: optimisation ----------------------------------------------------------- */
 
+/* Room for a band of rows, per pixel. */
+typedef struct txp_band {
+    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
+    int32_t *nearest;      /* squared distance of the best candidate from the mean             */
+    uint8_t *mean;
+} txp_band;
+
 /* The windows of one pass: those of a row lie side by side, `columns` of them, at xs[], ys[]. */
 typedef struct txp_pass {
     const txp_source *source;
@@ -2624,6 +2624,7 @@ typedef struct txp_pass {
     int exhaustive, first_row;
     int32_t bell[TXP_WINDOW * TXP_WINDOW]; /* 1..256 over a neighbourhood                       */
     int first_band;
+    txp_band bands[TXP_LANES]; /* as many as the canvas has, at most                          */
 } txp_pass;
 
 /* A search for the match of one window. */
@@ -3006,7 +3007,7 @@ static void txp_choose_band(void *context, int lane) {
     const int top = (p->first_band + lane) * TXP_BAND, n = p->source->bytes;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
     const size_t pixels = (size_t)(bottom - top) * (size_t)c->width;
-    const txp_band *band = &c->bands[lane];
+    const txp_band *band = &p->bands[lane];
     memset(band->sums, 0, pixels * (size_t)n * sizeof *band->sums);
     memset(band->total, 0, pixels * sizeof *band->total);
     for (int turn = 0; turn < 2; turn++) {
@@ -3493,7 +3494,7 @@ typedef struct txp_step {
 typedef struct txp_origins {
     txp_place *at;
     int16_t *bend; /* x, y by which each pixel's place is moved, times TXP_BEND_UNIT             */
-    int16_t *tone; /* what is added to each compared byte, txp_lanes of them, times TXP_TONE_UNIT */
+    int16_t *tone; /* what is added to each of the tones of a source, times TXP_TONE_UNIT         */
 } txp_origins;
 #define TXP_BEND_UNIT 2048.0f /* of a pixel; pieces are bent by some pixels                        */
 #define TXP_TONE_UNIT 256.0f  /* of a gray level; tones change by up to TXP_LARGE_STEP             */
@@ -3527,11 +3528,6 @@ struct texpatch_job {
     int part_x, part_y;
 };
 
-/* values per pixel of the field of tones */
-static inline int txp_lanes(const txp_source *s) {
-    return (s->guide_at + 3) / 4 * 4;
-}
-
 /* of a finished job */
 static inline txp_origins txp_origins_of(const texpatch_job *job) {
     txp_origins from;
@@ -3543,10 +3539,11 @@ static inline txp_origins txp_origins_of(const texpatch_job *job) {
 
 /* Copy count pixels, from pixel k of `from` to pixel i of `to`. */
 static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
-                                    size_t k, size_t count, size_t lanes) {
+                                    size_t k, size_t count, int tones) {
+    const size_t n = (size_t)tones;
     memcpy(to->at + i, from->at + k, count * sizeof *to->at);
     memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof *to->bend);
-    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof *to->tone);
+    memcpy(to->tone + n * i, from->tone + n * k, count * n * sizeof *to->tone);
 }
 
 /* The next step; there is room for two windows on all levels, 16 passes each, the quilt, polishing twice
@@ -3638,16 +3635,6 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
-    for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
-        txp_band *b = &c->bands[i];
-        const size_t band = (size_t)c->width * TXP_BAND;
-        if (i * TXP_BAND >= c->height) break; /* there are no more bands */
-        b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
-        b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
-        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
-        b->total = b->sums + band * n;
-        b->nearest = b->total + band;
-    }
     memset(c->at, 255, pixels * sizeof *c->at);
     if (!job->given.pixels) return TXM_OK;
     for (int y = 0; y < c->height; y++) {
@@ -3846,7 +3833,7 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Allocate what a pass over c needs, except bands; scratch->failed: no memory. */
+/* Allocate what a pass over c needs; scratch->failed: no memory. */
 static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
@@ -3859,6 +3846,15 @@ static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) 
     p->weight = (int32_t *)txm_arena_alloc(scratch, windows, sizeof *p->weight);
     p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
     txp_use_make(p->stack, &p->use, scratch);
+    const size_t n = (size_t)p->source->bytes, band = (size_t)c->width * TXP_BAND;
+    for (int i = 0; i < TXP_LANES && i * TXP_BAND < c->height; i++) {
+        txp_band *b = &p->bands[i];
+        b->sums = (int32_t *)txm_arena_alloc(scratch, band, (n + 2) * sizeof(int32_t));
+        b->mean = (uint8_t *)txm_arena_alloc(scratch, band, n);
+        if (scratch->failed) return;
+        b->total = b->sums + band * n;
+        b->nearest = b->total + band;
+    }
 }
 
 /* One pass of the optimisation over c; the places it chooses go into c->next. */
@@ -3947,6 +3943,7 @@ enum {
 /* The two fields over some rows. */
 typedef struct txp_fields {
     txp_field bend, tone;
+    int tones; /* of the lanes of tone so many are used                                            */
     int measured; /* rows from here on have no seams yet                                          */
 } txp_fields;
 
@@ -3958,17 +3955,17 @@ static inline int16_t txp_code(float value, float unit) {
 /* Set the values of fixed pixels. */
 static void txp_fields_fix(const txp_origins *given, txp_fields *f) {
     const txp_canvas *c = f->bend.canvas;
-    const size_t lanes = (size_t)f->tone.lanes;
+    const size_t lanes = (size_t)f->tone.lanes, tones = (size_t)f->tones;
     if (!given->bend) return;
     for (int y = 0; y < f->bend.height; y++) {
         const int row = txp_field_row(&f->bend, y);
         for (int x = 0; x < c->width && row >= 0; x++) {
             const size_t i = txp_index(c, x, row), at = (size_t)y * (size_t)c->width + (size_t)x;
-            const int16_t *b = given->bend + 2 * i, *v = given->tone + lanes * i;
+            const int16_t *b = given->bend + 2 * i, *v = given->tone + tones * i;
             float *bent = f->bend.value + 2 * at, *toned = f->tone.value + lanes * at, most = 0;
             if (!c->fixed[i]) continue;
             for (size_t k = 0; k < 2; k++) bent[k] = txm_float((float)b[k] / TXP_BEND_UNIT);
-            for (size_t k = 0; k < lanes; k++) {
+            for (size_t k = 0; k < tones; k++) {
                 toned[k] = txm_float((float)v[k] / TXP_TONE_UNIT);
                 most = txm_maxf(most, fabsf(toned[k]));
             }
@@ -4021,21 +4018,23 @@ static txm_status txp_fields_relax(const texpatch_job *job, txp_fields *f, int f
 /* Store rows from..to-1 of the fields. */
 static void txp_fields_store(const txp_fields *f, int from, int to, int16_t *bend, int16_t *tone) {
     const txp_canvas *c = f->bend.canvas;
-    const size_t width = (size_t)c->width, lanes = (size_t)f->tone.lanes;
+    const size_t width = (size_t)c->width, lanes = (size_t)f->tone.lanes, tones = (size_t)f->tones;
     const size_t first = (size_t)(f->bend.top + from) * width, at = (size_t)from * width;
     const size_t count = (size_t)(to - from) * width;
     TXM_ASSERT(f->bend.top + from >= 0 && f->bend.top + to <= c->height);
     for (size_t i = 0; i < 2 * count; i++)
         bend[2 * first + i] = txp_code(f->bend.value[2 * at + i], TXP_BEND_UNIT);
-    for (size_t i = 0; i < lanes * count; i++)
-        tone[lanes * first + i] = txp_code(f->tone.value[lanes * at + i], TXP_TONE_UNIT);
+    for (size_t i = 0; i < count; i++) {
+        const float *value = f->tone.value + lanes * (at + i);
+        for (size_t k = 0; k < tones; k++) tone[tones * (first + i) + k] = txp_code(value[k], TXP_TONE_UNIT);
+    }
 }
 
 /* Compute how the pieces of a canvas are bent and toned. A large one is done `step` rows at a time, a
-   multiple of TXP_BAND: the fields take 40 bytes a pixel of RGB, what is stored of them 12. */
+   multiple of TXP_BAND: the fields take 40 bytes a pixel of RGB, what is stored of them 10. */
 static txm_status txp_finish(const texpatch_job *job, const txp_canvas *c, int step, txm_arena *memory,
                              txp_origins *out, txm_env *env) {
-    const int lanes = txp_lanes(job->source), reach = TXP_FINISH_REACH;
+    const int lanes = (job->source->tones + 3) / 4 * 4, reach = TXP_FINISH_REACH;
     const int is_whole = c->height <= step + 2 * reach, rows = is_whole ? c->height : step + 2 * reach;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     txm_arena scratch;
@@ -4043,11 +4042,12 @@ static txm_status txp_finish(const texpatch_job *job, const txp_canvas *c, int s
     txm_status status = TXM_OK;
     TXM_ASSERT(reach >= TXP_FADE && step % TXP_BAND == 0);
     memset(&f, 0, sizeof f);
+    f.tones = job->source->tones;
     txm_arena_init(&scratch, env);
     txp_field_make(&f.bend, c, rows, 2, TXP_BEND_SCREEN, &scratch);
     txp_field_make(&f.tone, c, rows, lanes, TXP_TONE_SCREEN, &scratch);
     out->bend = (int16_t *)txm_arena_alloc(memory, pixels, 2 * sizeof *out->bend);
-    out->tone = (int16_t *)txm_arena_alloc(memory, pixels, (size_t)lanes * sizeof *out->tone);
+    out->tone = (int16_t *)txm_arena_alloc(memory, pixels, (size_t)f.tones * sizeof *out->tone);
     if (memory->failed || scratch.failed)
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
     if (!is_whole) f.bend.top = f.tone.top = -reach;
@@ -4106,7 +4106,7 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
         txp_origins *o = &g->from;
         o->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *o->at);
         o->bend = (int16_t *)txm_arena_zero(memory, pixels, 2 * sizeof *o->bend);
-        o->tone = (int16_t *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof *o->tone);
+        o->tone = (int16_t *)txm_arena_zero(memory, pixels, (size_t)s->tones * sizeof *o->tone);
     }
 }
 
@@ -4229,64 +4229,66 @@ static txm_status txp_step_choose(const texpatch_job *job, const txp_step *t, co
     return status;
 }
 
-/* A step of a job without a part. */
-static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
-    txm_arena memory;
-    txp_canvas canvas, finer;
-    txm_status status = TXM_OK;
-    const txp_step *t = &job->steps[job->next_step];
-    int level = job->level;
-    txm_arena_init(&memory, env);
-    canvas = job->canvas;
-    if (t->kind == TXP_STEP_QUILT) {
-        status = txp_step_quilt(job, &memory, &canvas, env);
-        level = t->level;
-    }
-    while (status == TXM_OK && level > t->level) {
-        status = txp_refine(job, &canvas, --level, &memory, &finer, env);
-        canvas = finer;
-    }
-    const int is_new = level != job->level || t->kind == TXP_STEP_QUILT;
-    if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
-        status = txp_step_choose(job, t, &canvas, env);
-    if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
-        txm_arena stored;
-        txp_origins made;
-        txm_arena_init(&stored, env);
-        status = txp_finish(job, &canvas, TXP_FINISH_ROWS, &stored, &made, env);
-        if (status != TXM_OK) txm_arena_free(&stored);
-        else {
-            job->finish_memory = stored;
-            job->bend = made.bend;
-            job->tone = made.tone;
+/* Bring the canvas to the level of a step: each level takes the place of the one before. */
+static txm_status txp_step_reach(texpatch_job *job, const txp_step *t, txm_env *env) {
+    while (job->level < 0 || job->level > t->level) {
+        const int level = job->level < 0 ? t->level : job->level - 1;
+        txm_arena memory;
+        txp_canvas canvas;
+        txm_arena_init(&memory, env);
+        const txm_status status = job->level < 0
+                                      ? txp_step_quilt(job, &memory, &canvas, env)
+                                      : txp_refine(job, &job->canvas, level, &memory, &canvas, env);
+        if (status != TXM_OK) {
+            txm_arena_free(&memory);
+            return status;
         }
-    }
-    if (status != TXM_OK) {
-        txm_arena_free(&memory);
-        return status;
-    }
-    if (is_new) {
         txm_arena_free(&job->canvas_memory);
         job->canvas_memory = memory;
+        job->canvas = canvas;
+        job->level = level;
     }
-    job->canvas = canvas;
-    job->level = level;
-    job->next_step++;
     return TXM_OK;
+}
+
+static txm_status txp_step_finish(texpatch_job *job, txm_env *env) {
+    txm_arena stored;
+    txp_origins made;
+    txm_arena_init(&stored, env);
+    const txm_status status = txp_finish(job, &job->canvas, TXP_FINISH_ROWS, &stored, &made, env);
+    if (status != TXM_OK) {
+        txm_arena_free(&stored);
+        return status;
+    }
+    job->finish_memory = stored;
+    job->bend = made.bend;
+    job->tone = made.tone;
+    return TXM_OK;
+}
+
+/* A step of a job without a part. The first one is the quilt, which is all that it is. */
+static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
+    const txp_step *t = &job->steps[job->next_step];
+    txm_status status = txp_step_reach(job, t, env);
+    if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
+        status = txp_step_choose(job, t, &job->canvas, env);
+    if (status == TXM_OK && t->kind == TXP_STEP_FINISH) status = txp_step_finish(job, env);
+    if (status == TXM_OK) job->next_step++;
+    return status;
 }
 
 /* Copy the part that was made again into the whole. */
 static void txp_part_join(texpatch_job *job) {
     texpatch_job *part = job->part;
     const txp_source *s = job->source;
-    const size_t lanes = (size_t)txp_lanes(s), n = (size_t)s->bytes;
+    const size_t n = (size_t)s->bytes;
     const txp_origins from = txp_origins_of(part), to = txp_origins_of(job);
     for (int y = 0; y < part->height; y++) {
         for (int x = 0; x < part->width; x++) {
             const size_t i = txp_index(&part->canvas, x, y);
             const size_t k = txp_index(&job->canvas, job->part_x + x, job->part_y + y);
             if (part->given.fixed[i]) continue;
-            txp_copy_origins(&to, k, &from, i, 1, lanes);
+            txp_copy_origins(&to, k, &from, i, 1, s->tones);
             memcpy(txp_canvas_at(s, &job->canvas, job->part_x + x, job->part_y + y),
                    txp_canvas_at(s, &part->canvas, x, y), n);
         }
@@ -4372,7 +4374,7 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
         out.x += bx;
         out.y += by;
     }
-    out.tone = job->tone + i * (size_t)txp_lanes(s);
+    out.tone = job->tone + i * (size_t)s->tones;
     return out;
 }
 
@@ -4620,7 +4622,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     const txp_source *s = job->source;
     const txp_setup *u = &job->setup;
     const size_t n = (size_t)s->bytes, all = (size_t)job->width * (size_t)job->height;
-    const size_t lanes = (size_t)txp_lanes(s), tail = n - (size_t)s->guide_at;
+    const size_t tail = n - (size_t)s->guide_at;
     status = txm_mask_check(again, "again", u->width, u->height, TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (guide) {
@@ -4716,7 +4718,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
-            txp_copy_origins(&part->given.from, i, &from, k, 1, lanes);
+            txp_copy_origins(&part->given.from, i, &from, k, 1, s->tones);
         }
     }
     job->part = part;
@@ -4811,7 +4813,7 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
 /* Fix a piece on the canvas of a job, its top left pixel at (x, y); it may reach beyond that. */
 static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
     const txp_source *s = job->source;
-    const size_t n = (size_t)s->bytes, lanes = (size_t)txp_lanes(s);
+    const size_t n = (size_t)s->bytes;
     for (int v = 0; v < p->height; v++) {
         for (int u = 0; u < p->width; u++) {
             const int cx = x + u, cy = y + v;
@@ -4819,7 +4821,7 @@ static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
             const size_t i = (size_t)cy * (size_t)job->width + (size_t)cx;
             const size_t k = (size_t)v * (size_t)p->width + (size_t)u;
             job->given.fixed[i] = 1;
-            txp_copy_origins(&job->given.from, i, &p->from, k, 1, lanes);
+            txp_copy_origins(&job->given.from, i, &p->from, k, 1, s->tones);
             const txp_place at = p->from.at[k];
             memcpy(job->given.pixels + i * n, txp_stack_at(s, &s->stack[0], at.x, at.y), n);
         }
@@ -4829,7 +4831,7 @@ static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
 /* Run a job and keep the width x height pixels at (x, y) of it as a piece. Frees the job. */
 static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int height,
                                 txp_piece *p, txm_env *env) {
-    const size_t lanes = (size_t)txp_lanes(job->source);
+    const int tones = job->source->tones;
     const size_t pixels = (size_t)width * (size_t)height;
     txm_status status = txp_run(job, env);
     txm_arena_init(&p->memory, env);
@@ -4837,14 +4839,14 @@ static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int 
         txp_origins *o = &p->from;
         o->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *o->at);
         o->bend = (int16_t *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof *o->bend);
-        o->tone = (int16_t *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof *o->tone);
+        o->tone = (int16_t *)txm_arena_alloc(&p->memory, pixels, (size_t)tones * sizeof *o->tone);
         if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
     const txp_origins from = txp_origins_of(job);
     for (int v = 0; v < height && status == TXM_OK; v++)
         txp_copy_origins(&p->from, (size_t)v * (size_t)width, &from,
-                         txp_index(&job->canvas, x, y + v), (size_t)width, lanes);
+                         txp_index(&job->canvas, x, y + v), (size_t)width, tones);
     texpatch_free(job);
     if (status != TXM_OK) {
         txp_piece_free(p);

@@ -85,7 +85,7 @@
      TEXPATCH_NO_SIMD      plain C only. Else SSE2 where the compiler has it, with the same bytes.
 
    MEMORY
-     RGB: some 30 bytes for each pixel of the output while it is made, and 40 for each pixel of at
+     RGB: some 24 bytes for each pixel of the output while it is made, and 40 for each pixel of at
      most 320 rows of it; a copy of each map that has transparent pixels; some 6 for each pixel of the
      exemplar and each of its turned and mirrored forms. The plane holds one cell at a time, and 20
      bytes for each pixel along the upper and lower sides of a row of cells.

@@ -54,7 +54,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
     const txp_source *s = job->source;
     const txp_setup *u = &job->setup;
     const size_t n = (size_t)s->bytes, all = (size_t)job->width * (size_t)job->height;
-    const size_t lanes = (size_t)txp_lanes(s), tail = n - (size_t)s->guide_at;
+    const size_t tail = n - (size_t)s->guide_at;
     status = txm_mask_check(again, "again", u->width, u->height, TEXPATCH_MAX_PIXELS, env);
     if (status != TXM_OK) return status;
     if (guide) {
@@ -150,7 +150,7 @@ TEXPATCH_API txm_status texpatch_again(texpatch_job *job, const txm_image *again
                                    (job->given.fixed && job->given.fixed[k]);
             memcpy(part->given.pixels + i * n, txp_canvas_at(s, &job->canvas, x0 + x, y0 + y), n);
             if (part->given.free_guide) part->given.free_guide[i] = job->given.free_guide[k];
-            txp_copy_origins(&part->given.from, i, &from, k, 1, lanes);
+            txp_copy_origins(&part->given.from, i, &from, k, 1, s->tones);
         }
     }
     job->part = part;

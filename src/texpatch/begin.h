@@ -42,7 +42,7 @@ static void txp_given_make(txp_given *g, const txp_source *s, size_t pixels, int
         txp_origins *o = &g->from;
         o->at = (txp_place *)txm_arena_alloc(memory, pixels, sizeof *o->at);
         o->bend = (int16_t *)txm_arena_zero(memory, pixels, 2 * sizeof *o->bend);
-        o->tone = (int16_t *)txm_arena_zero(memory, pixels, (size_t)txp_lanes(s) * sizeof *o->tone);
+        o->tone = (int16_t *)txm_arena_zero(memory, pixels, (size_t)s->tones * sizeof *o->tone);
     }
 }
 
@@ -165,64 +165,66 @@ static txm_status txp_step_choose(const texpatch_job *job, const txp_step *t, co
     return status;
 }
 
-/* A step of a job without a part. */
-static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
-    txm_arena memory;
-    txp_canvas canvas, finer;
-    txm_status status = TXM_OK;
-    const txp_step *t = &job->steps[job->next_step];
-    int level = job->level;
-    txm_arena_init(&memory, env);
-    canvas = job->canvas;
-    if (t->kind == TXP_STEP_QUILT) {
-        status = txp_step_quilt(job, &memory, &canvas, env);
-        level = t->level;
-    }
-    while (status == TXM_OK && level > t->level) {
-        status = txp_refine(job, &canvas, --level, &memory, &finer, env);
-        canvas = finer;
-    }
-    const int is_new = level != job->level || t->kind == TXP_STEP_QUILT;
-    if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
-        status = txp_step_choose(job, t, &canvas, env);
-    if (status == TXM_OK && t->kind == TXP_STEP_FINISH) {
-        txm_arena stored;
-        txp_origins made;
-        txm_arena_init(&stored, env);
-        status = txp_finish(job, &canvas, TXP_FINISH_ROWS, &stored, &made, env);
-        if (status != TXM_OK) txm_arena_free(&stored);
-        else {
-            job->finish_memory = stored;
-            job->bend = made.bend;
-            job->tone = made.tone;
+/* Bring the canvas to the level of a step: each level takes the place of the one before. */
+static txm_status txp_step_reach(texpatch_job *job, const txp_step *t, txm_env *env) {
+    while (job->level < 0 || job->level > t->level) {
+        const int level = job->level < 0 ? t->level : job->level - 1;
+        txm_arena memory;
+        txp_canvas canvas;
+        txm_arena_init(&memory, env);
+        const txm_status status = job->level < 0
+                                      ? txp_step_quilt(job, &memory, &canvas, env)
+                                      : txp_refine(job, &job->canvas, level, &memory, &canvas, env);
+        if (status != TXM_OK) {
+            txm_arena_free(&memory);
+            return status;
         }
-    }
-    if (status != TXM_OK) {
-        txm_arena_free(&memory);
-        return status;
-    }
-    if (is_new) {
         txm_arena_free(&job->canvas_memory);
         job->canvas_memory = memory;
+        job->canvas = canvas;
+        job->level = level;
     }
-    job->canvas = canvas;
-    job->level = level;
-    job->next_step++;
     return TXM_OK;
+}
+
+static txm_status txp_step_finish(texpatch_job *job, txm_env *env) {
+    txm_arena stored;
+    txp_origins made;
+    txm_arena_init(&stored, env);
+    const txm_status status = txp_finish(job, &job->canvas, TXP_FINISH_ROWS, &stored, &made, env);
+    if (status != TXM_OK) {
+        txm_arena_free(&stored);
+        return status;
+    }
+    job->finish_memory = stored;
+    job->bend = made.bend;
+    job->tone = made.tone;
+    return TXM_OK;
+}
+
+/* A step of a job without a part. The first one is the quilt, which is all that it is. */
+static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
+    const txp_step *t = &job->steps[job->next_step];
+    txm_status status = txp_step_reach(job, t, env);
+    if (status == TXM_OK && (t->kind == TXP_STEP_PASS || t->kind == TXP_STEP_POLISH))
+        status = txp_step_choose(job, t, &job->canvas, env);
+    if (status == TXM_OK && t->kind == TXP_STEP_FINISH) status = txp_step_finish(job, env);
+    if (status == TXM_OK) job->next_step++;
+    return status;
 }
 
 /* Copy the part that was made again into the whole. */
 static void txp_part_join(texpatch_job *job) {
     texpatch_job *part = job->part;
     const txp_source *s = job->source;
-    const size_t lanes = (size_t)txp_lanes(s), n = (size_t)s->bytes;
+    const size_t n = (size_t)s->bytes;
     const txp_origins from = txp_origins_of(part), to = txp_origins_of(job);
     for (int y = 0; y < part->height; y++) {
         for (int x = 0; x < part->width; x++) {
             const size_t i = txp_index(&part->canvas, x, y);
             const size_t k = txp_index(&job->canvas, job->part_x + x, job->part_y + y);
             if (part->given.fixed[i]) continue;
-            txp_copy_origins(&to, k, &from, i, 1, lanes);
+            txp_copy_origins(&to, k, &from, i, 1, s->tones);
             memcpy(txp_canvas_at(s, &job->canvas, job->part_x + x, job->part_y + y),
                    txp_canvas_at(s, &part->canvas, x, y), n);
         }

@@ -191,6 +191,7 @@ static txm_status txp_check_exemplars(const texpatch_desc *d, txp_setup *u, txp_
     u->most_weight = s->guide_bytes ? u->guide_weight : 0;
     for (int m = 0; m < u->map_count; m++)
         u->most_weight = txm_maxf(u->most_weight, u->kinds[m].weight);
+    s->tones = bytes;
     s->bytes = (bytes + s->guide_bytes + 3) / 4 * 4;
     s->guide_at = s->guide_bytes ? bytes : s->bytes;
     txp_find_alphas(u, s);

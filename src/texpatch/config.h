@@ -69,7 +69,7 @@ typedef struct txp_courses {
 
 /* What all jobs on the same exemplars share. */
 typedef struct txp_source {
-    int sheets, levels, bytes, guide_at, guide_bytes;
+    int sheets, levels, bytes, tones, guide_at, guide_bytes; /* tones: bytes of the maps          */
     int has_lattice, is_random; /* is_random: no long-range order at all                        */
     txp_courses courses;        /* where the lattice holds for each course alone                */
     double contrast;            /* mean difference of two pixels anywhere, bytes summed         */
@@ -81,13 +81,6 @@ typedef struct txp_source {
     txp_stack stack[TXP_MAX_LEVELS];
 } txp_source;
 
-/* Room for a band of rows, per pixel. */
-typedef struct txp_band {
-    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
-    int32_t *nearest;      /* squared distance of the best candidate from the mean             */
-    uint8_t *mean;
-} txp_band;
-
 /* The picture at one resolution. Beyond the end of an axis that wraps, pixels repeats the first
    columns and rows. */
 typedef struct txp_canvas {
@@ -96,7 +89,6 @@ typedef struct txp_canvas {
     uint8_t *pixels;
     txp_place *at;
     txp_place *next; /* where a pass puts what it chooses; only during one                      */
-    txp_band bands[TXP_LANES];
     uint8_t *fixed; /* 1 = not to be changed; NULL: nothing is                                 */
     uint8_t *free_guide; /* 1 = the guide does not count here; NULL: it does, or there is none  */
 } txp_canvas;

@@ -63,7 +63,7 @@ static txp_pixel txp_pixel_at(const texpatch_job *job, int x, int y) {
         out.x += bx;
         out.y += by;
     }
-    out.tone = job->tone + i * (size_t)txp_lanes(s);
+    out.tone = job->tone + i * (size_t)s->tones;
     return out;
 }
 

@@ -18,6 +18,7 @@ enum {
 /* The two fields over some rows. */
 typedef struct txp_fields {
     txp_field bend, tone;
+    int tones; /* of the lanes of tone so many are used                                            */
     int measured; /* rows from here on have no seams yet                                          */
 } txp_fields;
 
@@ -29,17 +30,17 @@ static inline int16_t txp_code(float value, float unit) {
 /* Set the values of fixed pixels. */
 static void txp_fields_fix(const txp_origins *given, txp_fields *f) {
     const txp_canvas *c = f->bend.canvas;
-    const size_t lanes = (size_t)f->tone.lanes;
+    const size_t lanes = (size_t)f->tone.lanes, tones = (size_t)f->tones;
     if (!given->bend) return;
     for (int y = 0; y < f->bend.height; y++) {
         const int row = txp_field_row(&f->bend, y);
         for (int x = 0; x < c->width && row >= 0; x++) {
             const size_t i = txp_index(c, x, row), at = (size_t)y * (size_t)c->width + (size_t)x;
-            const int16_t *b = given->bend + 2 * i, *v = given->tone + lanes * i;
+            const int16_t *b = given->bend + 2 * i, *v = given->tone + tones * i;
             float *bent = f->bend.value + 2 * at, *toned = f->tone.value + lanes * at, most = 0;
             if (!c->fixed[i]) continue;
             for (size_t k = 0; k < 2; k++) bent[k] = txm_float((float)b[k] / TXP_BEND_UNIT);
-            for (size_t k = 0; k < lanes; k++) {
+            for (size_t k = 0; k < tones; k++) {
                 toned[k] = txm_float((float)v[k] / TXP_TONE_UNIT);
                 most = txm_maxf(most, fabsf(toned[k]));
             }
@@ -92,21 +93,23 @@ static txm_status txp_fields_relax(const texpatch_job *job, txp_fields *f, int f
 /* Store rows from..to-1 of the fields. */
 static void txp_fields_store(const txp_fields *f, int from, int to, int16_t *bend, int16_t *tone) {
     const txp_canvas *c = f->bend.canvas;
-    const size_t width = (size_t)c->width, lanes = (size_t)f->tone.lanes;
+    const size_t width = (size_t)c->width, lanes = (size_t)f->tone.lanes, tones = (size_t)f->tones;
     const size_t first = (size_t)(f->bend.top + from) * width, at = (size_t)from * width;
     const size_t count = (size_t)(to - from) * width;
     TXM_ASSERT(f->bend.top + from >= 0 && f->bend.top + to <= c->height);
     for (size_t i = 0; i < 2 * count; i++)
         bend[2 * first + i] = txp_code(f->bend.value[2 * at + i], TXP_BEND_UNIT);
-    for (size_t i = 0; i < lanes * count; i++)
-        tone[lanes * first + i] = txp_code(f->tone.value[lanes * at + i], TXP_TONE_UNIT);
+    for (size_t i = 0; i < count; i++) {
+        const float *value = f->tone.value + lanes * (at + i);
+        for (size_t k = 0; k < tones; k++) tone[tones * (first + i) + k] = txp_code(value[k], TXP_TONE_UNIT);
+    }
 }
 
 /* Compute how the pieces of a canvas are bent and toned. A large one is done `step` rows at a time, a
-   multiple of TXP_BAND: the fields take 40 bytes a pixel of RGB, what is stored of them 12. */
+   multiple of TXP_BAND: the fields take 40 bytes a pixel of RGB, what is stored of them 10. */
 static txm_status txp_finish(const texpatch_job *job, const txp_canvas *c, int step, txm_arena *memory,
                              txp_origins *out, txm_env *env) {
-    const int lanes = txp_lanes(job->source), reach = TXP_FINISH_REACH;
+    const int lanes = (job->source->tones + 3) / 4 * 4, reach = TXP_FINISH_REACH;
     const int is_whole = c->height <= step + 2 * reach, rows = is_whole ? c->height : step + 2 * reach;
     const size_t pixels = (size_t)c->width * (size_t)c->height;
     txm_arena scratch;
@@ -114,11 +117,12 @@ static txm_status txp_finish(const texpatch_job *job, const txp_canvas *c, int s
     txm_status status = TXM_OK;
     TXM_ASSERT(reach >= TXP_FADE && step % TXP_BAND == 0);
     memset(&f, 0, sizeof f);
+    f.tones = job->source->tones;
     txm_arena_init(&scratch, env);
     txp_field_make(&f.bend, c, rows, 2, TXP_BEND_SCREEN, &scratch);
     txp_field_make(&f.tone, c, rows, lanes, TXP_TONE_SCREEN, &scratch);
     out->bend = (int16_t *)txm_arena_alloc(memory, pixels, 2 * sizeof *out->bend);
-    out->tone = (int16_t *)txm_arena_alloc(memory, pixels, (size_t)lanes * sizeof *out->tone);
+    out->tone = (int16_t *)txm_arena_alloc(memory, pixels, (size_t)f.tones * sizeof *out->tone);
     if (memory->failed || scratch.failed)
         status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory to finish the picture");
     if (!is_whole) f.bend.top = f.tone.top = -reach;

@@ -21,7 +21,7 @@ typedef struct txp_step {
 typedef struct txp_origins {
     txp_place *at;
     int16_t *bend; /* x, y by which each pixel's place is moved, times TXP_BEND_UNIT             */
-    int16_t *tone; /* what is added to each compared byte, txp_lanes of them, times TXP_TONE_UNIT */
+    int16_t *tone; /* what is added to each of the tones of a source, times TXP_TONE_UNIT         */
 } txp_origins;
 #define TXP_BEND_UNIT 2048.0f /* of a pixel; pieces are bent by some pixels                        */
 #define TXP_TONE_UNIT 256.0f  /* of a gray level; tones change by up to TXP_LARGE_STEP             */
@@ -55,11 +55,6 @@ struct texpatch_job {
     int part_x, part_y;
 };
 
-/* values per pixel of the field of tones */
-static inline int txp_lanes(const txp_source *s) {
-    return (s->guide_at + 3) / 4 * 4;
-}
-
 /* of a finished job */
 static inline txp_origins txp_origins_of(const texpatch_job *job) {
     txp_origins from;
@@ -71,10 +66,11 @@ static inline txp_origins txp_origins_of(const texpatch_job *job) {
 
 /* Copy count pixels, from pixel k of `from` to pixel i of `to`. */
 static inline void txp_copy_origins(const txp_origins *to, size_t i, const txp_origins *from,
-                                    size_t k, size_t count, size_t lanes) {
+                                    size_t k, size_t count, int tones) {
+    const size_t n = (size_t)tones;
     memcpy(to->at + i, from->at + k, count * sizeof *to->at);
     memcpy(to->bend + 2 * i, from->bend + 2 * k, count * 2 * sizeof *to->bend);
-    memcpy(to->tone + lanes * i, from->tone + lanes * k, count * lanes * sizeof *to->tone);
+    memcpy(to->tone + n * i, from->tone + n * k, count * n * sizeof *to->tone);
 }
 
 /* The next step; there is room for two windows on all levels, 16 passes each, the quilt, polishing twice
@@ -166,16 +162,6 @@ static txm_status txp_canvas_make(const texpatch_job *job, int level, txm_arena 
     if (job->given.fixed) c->fixed = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (job->given.free_guide) c->free_guide = (uint8_t *)txm_arena_zero(arena, pixels, 1);
     if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
-    for (int i = 0; i < TXP_LANES && job->setup.passes > 0; i++) {
-        txp_band *b = &c->bands[i];
-        const size_t band = (size_t)c->width * TXP_BAND;
-        if (i * TXP_BAND >= c->height) break; /* there are no more bands */
-        b->sums = (int32_t *)txm_arena_alloc(arena, band, (n + 2) * sizeof(int32_t));
-        b->mean = (uint8_t *)txm_arena_alloc(arena, band, n);
-        if (arena->failed) return txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for the canvas");
-        b->total = b->sums + band * n;
-        b->nearest = b->total + band;
-    }
     memset(c->at, 255, pixels * sizeof *c->at);
     if (!job->given.pixels) return TXM_OK;
     for (int y = 0; y < c->height; y++) {
@@ -374,7 +360,7 @@ static int txp_grid(int extent, int size, int step, int wraps, int *at) {
     return n;
 }
 
-/* Allocate what a pass over c needs, except bands; scratch->failed: no memory. */
+/* Allocate what a pass over c needs; scratch->failed: no memory. */
 static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) {
     p->xs = (int *)txm_arena_alloc(scratch, (size_t)(c->width / p->step + 2), sizeof(int));
     p->ys = (int *)txm_arena_alloc(scratch, (size_t)(c->height / p->step + 2), sizeof(int));
@@ -387,6 +373,15 @@ static void txp_pass_make(txp_pass *p, const txp_canvas *c, txm_arena *scratch) 
     p->weight = (int32_t *)txm_arena_alloc(scratch, windows, sizeof *p->weight);
     p->grain = (uint32_t *)txm_arena_zero(scratch, windows, sizeof *p->grain);
     txp_use_make(p->stack, &p->use, scratch);
+    const size_t n = (size_t)p->source->bytes, band = (size_t)c->width * TXP_BAND;
+    for (int i = 0; i < TXP_LANES && i * TXP_BAND < c->height; i++) {
+        txp_band *b = &p->bands[i];
+        b->sums = (int32_t *)txm_arena_alloc(scratch, band, (n + 2) * sizeof(int32_t));
+        b->mean = (uint8_t *)txm_arena_alloc(scratch, band, n);
+        if (scratch->failed) return;
+        b->total = b->sums + band * n;
+        b->nearest = b->total + band;
+    }
 }
 
 /* One pass of the optimisation over c; the places it chooses go into c->next. */

@@ -84,7 +84,7 @@ static txm_status txp_plane_job(const texpatch_plane *plane, int64_t x, int64_t 
 /* Fix a piece on the canvas of a job, its top left pixel at (x, y); it may reach beyond that. */
 static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
     const txp_source *s = job->source;
-    const size_t n = (size_t)s->bytes, lanes = (size_t)txp_lanes(s);
+    const size_t n = (size_t)s->bytes;
     for (int v = 0; v < p->height; v++) {
         for (int u = 0; u < p->width; u++) {
             const int cx = x + u, cy = y + v;
@@ -92,7 +92,7 @@ static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
             const size_t i = (size_t)cy * (size_t)job->width + (size_t)cx;
             const size_t k = (size_t)v * (size_t)p->width + (size_t)u;
             job->given.fixed[i] = 1;
-            txp_copy_origins(&job->given.from, i, &p->from, k, 1, lanes);
+            txp_copy_origins(&job->given.from, i, &p->from, k, 1, s->tones);
             const txp_place at = p->from.at[k];
             memcpy(job->given.pixels + i * n, txp_stack_at(s, &s->stack[0], at.x, at.y), n);
         }
@@ -102,7 +102,7 @@ static void txp_plane_fix(texpatch_job *job, const txp_piece *p, int x, int y) {
 /* Run a job and keep the width x height pixels at (x, y) of it as a piece. Frees the job. */
 static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int height,
                                 txp_piece *p, txm_env *env) {
-    const size_t lanes = (size_t)txp_lanes(job->source);
+    const int tones = job->source->tones;
     const size_t pixels = (size_t)width * (size_t)height;
     txm_status status = txp_run(job, env);
     txm_arena_init(&p->memory, env);
@@ -110,14 +110,14 @@ static txm_status txp_plane_run(texpatch_job *job, int x, int y, int width, int 
         txp_origins *o = &p->from;
         o->at = (txp_place *)txm_arena_alloc(&p->memory, pixels, sizeof *o->at);
         o->bend = (int16_t *)txm_arena_alloc(&p->memory, pixels, 2 * sizeof *o->bend);
-        o->tone = (int16_t *)txm_arena_alloc(&p->memory, pixels, lanes * sizeof *o->tone);
+        o->tone = (int16_t *)txm_arena_alloc(&p->memory, pixels, (size_t)tones * sizeof *o->tone);
         if (p->memory.failed)
             status = txm_fail(env, TXM_OUT_OF_MEMORY, "no memory for a piece of the plane");
     }
     const txp_origins from = txp_origins_of(job);
     for (int v = 0; v < height && status == TXM_OK; v++)
         txp_copy_origins(&p->from, (size_t)v * (size_t)width, &from,
-                         txp_index(&job->canvas, x, y + v), (size_t)width, lanes);
+                         txp_index(&job->canvas, x, y + v), (size_t)width, tones);
     texpatch_free(job);
     if (status != TXM_OK) {
         txp_piece_free(p);

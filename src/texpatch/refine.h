@@ -5,6 +5,13 @@
 
 /* ---- second pass: optimisation ----------------------------------------------------------- */
 
+/* Room for a band of rows, per pixel. */
+typedef struct txp_band {
+    int32_t *sums, *total; /* of the bytes of all candidates, weighted; of the weights          */
+    int32_t *nearest;      /* squared distance of the best candidate from the mean             */
+    uint8_t *mean;
+} txp_band;
+
 /* The windows of one pass: those of a row lie side by side, `columns` of them, at xs[], ys[]. */
 typedef struct txp_pass {
     const txp_source *source;
@@ -25,6 +32,7 @@ typedef struct txp_pass {
     int exhaustive, first_row;
     int32_t bell[TXP_WINDOW * TXP_WINDOW]; /* 1..256 over a neighbourhood                       */
     int first_band;
+    txp_band bands[TXP_LANES]; /* as many as the canvas has, at most                          */
 } txp_pass;
 
 /* A search for the match of one window. */
@@ -407,7 +415,7 @@ static void txp_choose_band(void *context, int lane) {
     const int top = (p->first_band + lane) * TXP_BAND, n = p->source->bytes;
     const int bottom = top + TXP_BAND < c->height ? top + TXP_BAND : c->height;
     const size_t pixels = (size_t)(bottom - top) * (size_t)c->width;
-    const txp_band *band = &c->bands[lane];
+    const txp_band *band = &p->bands[lane];
     memset(band->sums, 0, pixels * (size_t)n * sizeof *band->sums);
     memset(band->total, 0, pixels * sizeof *band->total);
     for (int turn = 0; turn < 2; turn++) {

@@ -41,17 +41,17 @@ static void test_some_rows_at_a_time(void **state) {
     for (int k = 0; k < 3; k++) {
         texpatch_job *job = unfinished(&gravel, heights[k], tileable[k]);
         const size_t pixels = (size_t)job->canvas.width * (size_t)job->canvas.height;
-        const size_t lanes = (size_t)txp_lanes(job->source);
+        const size_t tones = (size_t)job->source->tones;
         txm_arena arena;
         txm_arena_init(&arena, NULL);
         const txp_origins whole = finished(job, ALL_ROWS, &arena);
-        const int bent = largest(whole.bend, 2 * pixels), toned = largest(whole.tone, lanes * pixels);
+        const int bent = largest(whole.bend, 2 * pixels), toned = largest(whole.tone, tones * pixels);
         assert_between("pixels bent at most", bent / 2048.0, 0.5, 8);
         assert_between("gray levels toned at most", toned / 256.0, 1, 64);
         for (int step = TXP_BAND; step <= 8 * TXP_BAND; step *= 8) {
             const txp_origins parts = finished(job, step, &arena);
             assert_memory_equal(whole.bend, parts.bend, 2 * pixels * sizeof *whole.bend);
-            assert_memory_equal(whole.tone, parts.tone, lanes * pixels * sizeof *whole.tone);
+            assert_memory_equal(whole.tone, parts.tone, tones * pixels * sizeof *whole.tone);
         }
         txm_arena_free(&arena);
         texpatch_free(job);
