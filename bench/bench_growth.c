@@ -271,9 +271,11 @@ static void line(const task *what, const txm_image *picture) {
         const double ratio = paper.best.cpu / (paper.best.cpu - paper.best.saved);
         if (ratio > ideal) ideal = ratio;
     }
-    printf(" %8.2f %7.3g %7.3g %5.2f %5.2f %11.1f  %s\n", exponent(t), 1e6 * one->best.seconds / one->units,
-           1e6 * two.best.seconds / one->units, one->best.seconds / two.best.seconds, ideal,
-           (double)one->best.peak / one->units, what->unit);
+    printf(" %8.2f %7.3g %7.3g %5.2f %5.2f", exponent(t), 1e6 * one->best.seconds / one->units,
+           1e6 * two.best.seconds / one->units, one->best.seconds / two.best.seconds, ideal);
+    if (one->best.peak) printf(" %11.1f", (double)one->best.peak / one->units);
+    else printf(" %11s", "-"); /* of the tool, whose memory is not counted */
+    printf("  %s\n", what->unit);
     fflush(stdout);
 }
 
