@@ -19,7 +19,7 @@ static textiles_desc make_desc(source *s) {
     textiles_desc d;
     memset(&d, 0, sizeof d);
     d.kind = (textiles_kind)pick(s, pick(s, 40) ? 4 : 6);
-    d.size = pick(s, 30) ? 32 + pick(s, 12) : pick(s, 3) * 350; /* larger ones take minutes */
+    d.size = pick(s, 30) ? 32 + pick(s, 12) : pick(s, 3) * 150; /* 32 tiles of 700 take minutes */
     d.colors = pick(s, 30) ? 1 + pick(s, 3) : pick(s, 8) - 1;
     d.variants = pick(s, 30) ? pick(s, 4) : pick(s, 30);
     d.reduced = pick(s, 3) == 0;
