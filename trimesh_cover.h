@@ -1723,6 +1723,12 @@ static uint32_t tmc_mix(const tmc_scatter *s, uint64_t h) {
     return (uint32_t)k;
 }
 
+/* As a float: of meshes near the end of the range of floats, things on them may lie beyond it. */
+static float tmc_bounded(double x) {
+    const double most = 3.4028234663852886e38;
+    return txm_float(x < -most ? -most : x > most ? most : x);
+}
+
 static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_item *item,
                            uint64_t h, trimesh_instance *out) {
     const trimesh_scatter_desc *d = s->desc;
@@ -1745,14 +1751,14 @@ static void tmc_place_item(const tmc_scatter *s, const tmc_base *b, const tmc_it
     if (d->spin) q = txm_quat_mul(q, tmc_spin(h));
     const double length = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     const double scale = q.w < 0 ? -1 / length : 1 / length;
-    out->position[0] = txm_float(p.x);
-    out->position[1] = txm_float(p.y);
-    out->position[2] = txm_float(p.z);
+    out->position[0] = tmc_bounded(p.x);
+    out->position[1] = tmc_bounded(p.y);
+    out->position[2] = tmc_bounded(p.z);
     out->rotation[0] = txm_float(q.x * scale);
     out->rotation[1] = txm_float(q.y * scale);
     out->rotation[2] = txm_float(q.z * scale);
     out->rotation[3] = txm_float(q.w * scale);
-    out->scale = txm_float(item->scale * b->unit);
+    out->scale = tmc_bounded(item->scale * b->unit);
     out->prototype = s->mix ? tmc_mix(s, txm_hash(h)) : item->prototype;
 }
 

@@ -469,8 +469,41 @@ static void test_degenerate(void **state) {
     shape_free(&s);
 }
 
+/* Near the end of the range of floats things stay within it. */
+static void test_far(void **state) {
+    static const float corners[3][3] = {{3e38f, 0, 3e38f}, {3.2e38f, 0, 3e38f}, {3e38f, 2e37f, 3e38f}};
+    static const float heights[] = {0, 3, 1000};
+    shape s;
+    trimesh_patch patch;
+    trimesh_scatter_desc d;
+    size_t count;
+    (void)state;
+    make_plane(&s, 1, 1);
+    s.view.face_count = 1;
+    for (int k = 0; k < 3; k++) put(&s, s.indices[k], corners[k][0], corners[k][1], corners[k][2]);
+    make_patch(12, 0, 1, &patch);
+    memset(&d, 0, sizeof d);
+    d.mesh = s.view;
+    d.patches = &patch;
+    d.patch_count = 1;
+    for (int i = 0; i < 6; i++) {
+        d.height = heights[i / 2];
+        d.unit = i & 1 ? 3e38f : 0.0f;
+        trimesh_instance *out = scatter(&d, NULL, &count);
+        assert_true(count > 0);
+        for (size_t k = 0; k < count; k++) {
+            for (int c = 0; c < 3; c++) assert_true(txm_is_finite(out[k].position[c]));
+            assert_true(txm_is_finite(out[k].scale));
+        }
+        free(out);
+    }
+    free((void *)(uintptr_t)patch.points);
+    shape_free(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_far),
         cmocka_unit_test(test_owned_once),
         cmocka_unit_test(test_placing),
         cmocka_unit_test(test_mix_and_spin),
