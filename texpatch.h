@@ -4266,7 +4266,7 @@ static txm_status txp_step_finish(texpatch_job *job, txm_env *env) {
     return TXM_OK;
 }
 
-/* A step of a job without a part. The first one is the quilt, which is all that it is. */
+/* A step of a job without a part. The first one, the quilt, is done once its level is reached. */
 static txm_status txp_step_run(texpatch_job *job, txm_env *env) {
     const txp_step *t = &job->steps[job->next_step];
     txm_status status = txp_step_reach(job, t, env);

@@ -47,7 +47,7 @@ static void tmr_permute_faces(tmr_mesh *m, const int32_t *list, const int32_t *n
 }
 
 /* The vertices in the order in which triangles come to them, those of no triangle left out.
-   number, list: scratch, 1 per vertex. Uses w->moved and w->landed. */
+   number, list: scratch, 1 per vertex. Uses w->moved, w->landed and w->mask_room. */
 static void tmr_permute_vertices(tmr_work *w, int32_t *number, int32_t *list) {
     tmr_mesh *m = &w->m;
     txm_dvec3 *const place[2] = {m->p, m->n};
